@@ -1,0 +1,1 @@
+"""A window of keypoints -> the fall-state horizon."""

@@ -1,0 +1,1 @@
+"""Everything that crosses a process: messages, topics, transports, config, launching, CLI."""

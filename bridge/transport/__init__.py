@@ -1,0 +1,1 @@
+"""Ways to carry bytes between nodes behind one interface."""

@@ -1,0 +1,1 @@
+"""Horizon, wrench and odometry -> base and support command."""

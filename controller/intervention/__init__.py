@@ -1,0 +1,1 @@
+"""From fall-state horizon to stiffening profile and supervisor state."""

@@ -1,0 +1,1 @@
+"""The MPC admittance law: problem, solver and plan."""

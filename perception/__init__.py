@@ -1,0 +1,1 @@
+"""Camera, video or recording -> twelve cleaned keypoints in the image."""
