@@ -30,5 +30,5 @@ class TransportError(SurefootError):
     """An endpoint that cannot be opened: port in use, malformed address, no permission."""
 
 
-class InvalidMessage(ValueError):
+class InvalidMessage(ValueError):  # noqa: N818 (it describes the message, not a failure here)
     """A message that must not be acted on; the text names the field, the value and the limit."""

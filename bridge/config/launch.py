@@ -1,0 +1,50 @@
+"""Configuration of `surefoot up`."""
+
+from __future__ import annotations
+
+from typing import Any, Final, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from bridge.config.section import Section
+
+DEFAULT_MODULES: Final = {
+    "perception": "perception.node",
+    "anticipation": "anticipation.node",
+    "controller": "controller.node",
+    "drive": "simulation.drive.node",
+}
+
+
+class LaunchConfig(Section):
+    """Which processes run here and how they are looked after."""
+
+    roles: tuple[str, ...] = ("perception", "anticipation", "controller", "drive")
+    """Roles started on this machine, in this order; leave out those that run elsewhere."""
+
+    modules: dict[str, str] = Field(default_factory=lambda: dict(DEFAULT_MODULES))
+    """Python module that runs each role (`python -m MODULE`); name your own to replace one, the rest keep theirs."""
+
+    restart: bool = True
+    """Start a process again when it died."""
+
+    restart_limit: int = Field(default=5, ge=0, le=100)
+    """Give up on a role after this many restarts within `restart_window_s`."""
+
+    restart_window_s: float = Field(default=30.0, gt=0, le=3600)
+    """Span over which restarts are counted [s]."""
+
+    stop_timeout_s: float = Field(default=3.0, gt=0, le=60)
+    """How long a process may take to stop before it is killed [s]."""
+
+    @field_validator("modules", mode="before")
+    @classmethod
+    def _add_defaults(cls, value: Any) -> Any:
+        return {**DEFAULT_MODULES, **value} if isinstance(value, dict) else value
+
+    @model_validator(mode="after")
+    def _know_every_module(self) -> Self:
+        for role in self.roles:
+            if role not in self.modules:
+                raise ValueError(f"roles names '{role}', but modules.{role} is not set")
+        return self

@@ -1,0 +1,142 @@
+"""The reading end of a topic: inputs have an age and a validity, and what is wrong with them has a name."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from bridge.clock import NS
+from bridge.codec import decode
+from bridge.errors import InvalidMessage
+from bridge.messages import Message
+from bridge.topics import Topic
+from bridge.transport.interface import Sample, Transport
+
+M = TypeVar("M", bound=Message)
+
+FUTURE_TOLERANCE_S = 0.050  # clocks of two machines under NTP differ by less
+
+
+class Reading(NamedTuple, Generic[M]):
+    """What an inbox knows at one moment."""
+
+    message: M | None  # newest message that was acceptable on arrival, kept for information even when stale
+    age_s: float  # reader's now minus the message's stamp; inf without a message
+    fault: str  # why the input must not be used, in words; '' means usable
+    fresh: bool  # a new acceptable message since the last reading
+
+    @property
+    def ok(self) -> bool:
+        """Whether the message may be used."""
+        return self.fault == ""
+
+
+class Inbox(Generic[M]):
+    """Keeps the newest samples of one topic and judges them when asked.
+
+    The transport's callback only stores bytes. Decoding and every check run in the
+    reader's own loop: order by sequence number within one publisher, shape,
+    finiteness and range by the message's `check`, age by the reader's clock.
+    """
+
+    def __init__(self, transport: Transport, topic: Topic, max_age_s: float | None = None, depth: int = 1) -> None:
+        self.topic = topic
+        self.max_age_s = topic.max_age_s if max_age_s is None else max_age_s
+        self._waiting: deque[Sample] = deque(maxlen=depth)
+        self._arrived = threading.Event()
+        self._message: M | None = None
+        self._source: bytes = b""
+        self._sequence = -1
+        self._stamp_ns = 0
+        self._fault = ""
+        self.accepted = 0
+        self.refused = 0
+        self._handle = transport.subscribe(topic, self._store)
+
+    def _store(self, sample: Sample) -> None:
+        self._waiting.append(sample)
+        self._arrived.set()
+
+    def wait(self, timeout_s: float) -> bool:
+        """Block until a sample is waiting; return whether one is."""
+        return self._arrived.wait(timeout_s)
+
+    def read(self, now_ns: int) -> Reading[M]:
+        """Return the newest acceptable message with its age and what is wrong with the input now."""
+        before = self.accepted
+        for _ in self._take(now_ns):
+            pass
+        return self._reading(now_ns, fresh=self.accepted > before)
+
+    def drain(self, now_ns: int) -> list[M]:
+        """Return every well-formed message since the last call, in order.
+
+        A message that declares itself invalid is among them, so that its reader can say why.
+        """
+        return list(self._take(now_ns))
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._handle.close()
+
+    def _reading(self, now_ns: int, *, fresh: bool) -> Reading[M]:
+        if self._message is None:
+            return Reading(None, float("inf"), self._fault or f"no {self.topic.key} received yet", False)
+        age_s = (now_ns - self._message.stamp_ns) / NS
+        fault = self._fault
+        if not fault and age_s > self.max_age_s:
+            fault = f"{self.topic.key} is {age_s * 1e3:.0f} ms old, limit {self.max_age_s * 1e3:.0f}"
+        return Reading(self._message, age_s, fault, fresh)
+
+    def _take(self, now_ns: int) -> list[M]:
+        self._arrived.clear()
+        taken: list[M] = []
+        while self._waiting:
+            sample = self._waiting.popleft()
+            try:
+                message = self._judge(sample, now_ns)
+            except _OldSample:
+                self.refused += 1
+                continue
+            except InvalidMessage as error:
+                self.refused += 1
+                self._fault = str(error)
+                continue
+            taken.append(message)
+        return taken
+
+    def _judge(self, sample: Sample, now_ns: int) -> M:
+        message: Any = decode(self.topic, sample.payload, max(sample.sequence, 0))
+        ahead_s = (message.stamp_ns - now_ns) / NS
+        if ahead_s > FUTURE_TOLERANCE_S:
+            limit_ms = FUTURE_TOLERANCE_S * 1e3
+            raise InvalidMessage(f"{self.topic.key} is stamped {ahead_s * 1e3:.0f} ms ahead, limit {limit_ms:.0f}")
+        if self._is_old(sample, message):
+            raise _OldSample
+        self._source, self._sequence, self._stamp_ns = sample.source, sample.sequence, message.stamp_ns
+        try:
+            message.check()
+        except InvalidMessage as error:
+            self._fault = str(error)
+            if getattr(message, "valid", True):
+                raise
+            return message  # type: ignore[no-any-return]
+        self._message, self._fault = message, ""
+        self.accepted += 1
+        return message  # type: ignore[no-any-return]
+
+    def _is_old(self, sample: Sample, message: Message) -> bool:
+        """Whether something newer was taken already: by number within a publisher, by stamp across publishers.
+
+        Streams that every role writes interleave freely, so there each publisher is judged alone.
+        """
+        if sample.source == self._source and sample.sequence >= 0:
+            return sample.sequence <= self._sequence
+        if self.topic.publisher == "*":
+            return False
+        return message.stamp_ns <= self._stamp_ns
+
+
+class _OldSample(Exception):  # noqa: N818 (not an error: replaced by something newer)
+    """The sample was overtaken."""

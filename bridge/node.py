@@ -1,0 +1,154 @@
+"""Running one node as a process: arguments, wire, loop, diagnostics, signals."""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import logging
+import os
+import signal
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from bridge.clock import Clock, SystemClock, nanoseconds
+from bridge.config.load import load_config
+from bridge.config.surefoot import SurefootConfig
+from bridge.errors import ConfigError, SurefootError
+from bridge.messages import NodeStatus
+from bridge.outbox import Outbox
+from bridge.topics import DIAGNOSTICS
+from bridge.transport.interface import Transport
+from bridge.transport.zenoh import ZenohTransport
+
+STATUS_PERIOD_NS = nanoseconds(1.0 / DIAGNOSTICS.rate_hz)
+
+
+class NodeContext(NamedTuple):
+    """What a node is built from."""
+
+    config: SurefootConfig
+    transport: Transport
+    clock: Clock
+    log: logging.Logger
+    options: Mapping[str, str]  # of this role alone, from the command line; they win over the config
+    config_path: Path | None = None  # for parts that reload while running
+    overrides: tuple[str, ...] = ()
+
+
+class Node(Protocol):
+    """One process of the system, or one part of a lock-step run."""
+
+    @property
+    def period_s(self) -> float | None:
+        """Period of the loop [s]; None if the node paces itself in `wait`."""
+        ...
+
+    def step(self, now_ns: int) -> None:
+        """Do one turn of work at time `now_ns`."""
+        ...
+
+    def wait(self) -> None:
+        """Return when there may be work, at the latest after 50 ms."""
+        ...
+
+    def status(self, now_ns: int) -> NodeStatus:
+        """Return how the node is doing."""
+        ...
+
+    def finished(self) -> bool:
+        """Return whether the node has nothing left to do, ever."""
+        ...
+
+    def close(self) -> None:
+        """Release what the node holds."""
+        ...
+
+
+Factory = Callable[[NodeContext], Node]
+
+
+class _StopFlag:
+    """Set by SIGINT and SIGTERM."""
+
+    def __init__(self) -> None:
+        self.set = False
+        signal.signal(signal.SIGINT, self._raise)
+        signal.signal(signal.SIGTERM, self._raise)
+
+    def _raise(self, _number: int, _frame: object) -> None:
+        self.set = True
+
+
+def main(role: str, factory: Factory, arguments: Sequence[str] | None = None) -> int:
+    """Run `role` until it is finished or told to stop; return the exit code (2: bad input, said in one line)."""
+    parsed = _parse(role, arguments)
+    logging.basicConfig(stream=sys.stderr, level=logging.INFO, format=f"%(asctime)s {role} %(levelname)s %(message)s")
+    try:
+        stop = _StopFlag()
+        options = _options(parsed.option)
+        path = Path(parsed.config) if parsed.config else None
+        config = load_config(path, parsed.set)
+        clock = SystemClock()
+        transport = ZenohTransport(config.bridge, role, clock)
+        try:
+            context = NodeContext(config, transport, clock, logging.getLogger(role), options, path, tuple(parsed.set))
+            _serve(role, factory, context, stop)
+        finally:
+            transport.close()
+    except SurefootError as error:
+        print(f"surefoot {role}: {error}", file=sys.stderr)  # noqa: T201 (the one line a user reads)
+        return error.exit_code
+    return 0
+
+
+def _serve(role: str, factory: Factory, context: NodeContext, stop: _StopFlag) -> None:
+    node = factory(context)
+    try:
+        diagnostics = Outbox(context.transport, DIAGNOSTICS)
+        context.transport.declare_alive(role)
+        gc.collect()
+        gc.freeze()  # what start-up allocated is not walked again by every collection
+        _loop(node, diagnostics, context.clock, stop)
+    finally:
+        node.close()
+
+
+def _loop(node: Node, diagnostics: Outbox, clock: Clock, stop: _StopFlag) -> None:
+    parent = os.getppid()
+    due_ns = clock.now_ns()
+    status_due_ns = due_ns
+    while not (stop.set or node.finished()):
+        now_ns = clock.now_ns()
+        node.step(now_ns)
+        if now_ns >= status_due_ns:
+            diagnostics.send(node.status(now_ns))
+            status_due_ns = now_ns + STATUS_PERIOD_NS
+            if os.getppid() != parent:  # the launcher was killed: do not run on unattended
+                return
+        if node.period_s is None:
+            node.wait()
+            continue
+        period_ns = nanoseconds(node.period_s)
+        # a late turn is not made up for by a burst of early ones
+        due_ns = max(due_ns + period_ns, clock.now_ns())
+        clock.sleep_until(due_ns)
+
+
+def _parse(role: str, arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog=f"surefoot {role}", description=f"Run the {role} process.")
+    parser.add_argument("--config", default="", help="configuration file (TOML)")
+    parser.add_argument("--set", action="append", default=[], metavar="SECTION.KEY=VALUE", help="override one value")
+    parser.add_argument("--option", action="append", default=[], metavar="NAME=VALUE", help="option of this role")
+    return parser.parse_args(arguments)
+
+
+def _options(pairs: Sequence[str]) -> dict[str, str]:
+    options: dict[str, str] = {}
+    for pair in pairs:
+        name, equals, value = pair.partition("=")
+        if not equals or not name:
+            raise ConfigError(f"--option {pair}: expected NAME=VALUE")
+        options[name] = value
+    return options
