@@ -1,0 +1,53 @@
+# Every target builds .venv by itself on a machine that has Python >= 3.11 and nothing else.
+PYTHON ?= python3
+# The official index of CPU builds of PyTorch; set it empty to take whatever your package index offers.
+TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+
+.PHONY: demo test lint format bench clean
+
+demo: $(VENV)/.base
+	$(BIN)/surefoot demo
+
+test: $(VENV)/.dev
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(VENV)/.dev
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: $(VENV)/.dev
+	$(BIN)/python -m benchmarks.mpc --json runs/bench/mpc.json
+	$(BIN)/python -m benchmarks.anticipation --json runs/bench/anticipation.json
+	$(BIN)/python -m benchmarks.latency --json runs/bench/latency.json
+
+clean:
+	rm -rf $(VENV) runs build *.egg-info
+
+# torch goes first and alone: a CPU build sorts above the plain release of the same number, so it is taken
+# wherever one is offered, and nothing that follows pulls CUDA. The index is asked once, briefly, because pip
+# itself would retry an unreachable one for minutes.
+$(VENV)/.base: pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "surefoot needs Python >= 3.11; $(PYTHON) is $$($(PYTHON) -V 2>&1). Try: make PYTHON=python3.11" >&2; exit 2; }
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@index=""; \
+	if [ -n "$(TORCH_INDEX)" ] && $(PYTHON) -c 'import sys, urllib.request; urllib.request.urlopen(sys.argv[1], timeout=5)' \
+	  "$(TORCH_INDEX)/torch/" >/dev/null 2>&1; then index="--extra-index-url $(TORCH_INDEX)"; fi; \
+	echo "installing PyTorch (CPU build where offered)"; \
+	$(PIP) install --quiet -c constraints.txt $$index torch==2.13.0
+	@echo "installing Surefoot and its dependencies"
+	@$(PIP) install --quiet -c constraints.txt -e .
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/.base
+	@echo "installing what tests and lint need"
+	@$(PIP) install --quiet -c constraints.txt -e '.[dev]'
+	@touch $@
