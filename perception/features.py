@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from enum import IntEnum
 from typing import Any, Final
 
 import numpy as np
@@ -27,6 +28,8 @@ LEG_PER_TRUNK: Final = (0.530 - 0.039) / (0.818 - 0.530)
 "Biomechanics and Motor Control of Human Movement", 4th ed., figure 4.1)."""
 
 _LEGS: Final = ((L_HIP, L_KNEE, L_ANKLE), (R_HIP, R_KNEE, R_ANKLE))
+_STRETCHED: Final = 0.85  # share of the body length that is vertical in one who stands
+_BROADEST: Final = 0.9  # shoulder width over trunk length of one who is not foreshortened (Winter: 0.259 / 0.288)
 _MEDIAN_OF: Final = 5  # measurements; two wrong ones in a row change nothing
 _LONGEST_STEP_S: Final = 0.1  # a gap between frames is no evidence that the person shrank
 
@@ -73,14 +76,24 @@ def relative(position_px: NDArray[Any], body_length: float | NDArray[Any]) -> ND
     return scaled
 
 
+class _Posture(IntEnum):
+    """What a smaller measurement says about the person."""
+
+    OTHER = 0  # lying, bent: foreshortened, says nothing
+    UPRIGHT = 1  # trunk upright, legs hidden or bent: may be sitting, may be further away
+    STANDING = 2  # stretched out upright: further away
+
+
 class BodyScale:
     """Shoulder-hip-knee-ankle length of one person in the image, adapting slowly.
 
     One frame's measurement is foreshortened when the person bends, turns or lies
     along the line of sight, but never lengthened. So the length follows larger
-    measurements (coming nearer) within `grow_s`, smaller ones within `shrink_s`,
-    and these only while the trunk is upright in the image: lying down does not
-    shrink anybody. A running median keeps single wrong frames out.
+    measurements (coming nearer) within `grow_s`, or within `stand_s` where the trunk
+    is not upright, because detectors err most on people who lie. Smaller ones it
+    follows within `stand_s` while the person plainly stands, within `shrink_s` while
+    at least the trunk is upright in the image, and otherwise not at all: lying down
+    shrinks nobody. A running median keeps single wrong frames out.
     """
 
     def __init__(self, config: BodyScaleConfig) -> None:
@@ -107,7 +120,7 @@ class BodyScale:
             position_px: (12, 2), NaN where nothing was measured [px].
             time_s: time of the frame on any clock that does not run backwards [s].
         """
-        measured, upright = _measure(position_px)
+        measured, posture = _measure(position_px)
         if math.isnan(measured):
             return self._length
         if math.isnan(self._first_s):
@@ -121,9 +134,14 @@ class BodyScale:
             return self._length
         recent = _median(self._recent)
         if recent > self._length:
-            self._length += (recent - self._length) * -math.expm1(-step_s / self._config.grow_s)
-        elif upright:
-            self._length += (recent - self._length) * -math.expm1(-step_s / self._config.shrink_s)
+            follow_s = self._config.stand_s if posture is _Posture.OTHER else self._config.grow_s
+        elif posture is _Posture.STANDING:
+            follow_s = self._config.stand_s
+        elif posture is _Posture.UPRIGHT:
+            follow_s = self._config.shrink_s
+        else:
+            return self._length
+        self._length += (recent - self._length) * -math.expm1(-step_s / follow_s)
         return self._length
 
 
@@ -132,35 +150,42 @@ def _median(values: list[float] | deque[float]) -> float:
     return sorted(values)[(len(values) - 1) // 2]
 
 
-def _measure(position_px: Floats) -> tuple[float, bool]:
-    """Body length in one frame [px], NaN if too little is in view; and whether the trunk is upright.
+def _measure(position_px: Floats) -> tuple[float, _Posture]:
+    """Body length in one frame [px], NaN if too little is in view, and the posture.
 
     With only trunk or only legs in view the other is added in Winter's proportion.
     """
     points: list[list[float]] = position_px.tolist()
-    trunk_x, trunk_y = _trunk(points)
-    trunk = math.hypot(trunk_x, trunk_y)
-    leg = math.nan
+    shoulder_x, shoulder_y = _mean(points[L_SHOULDER], points[R_SHOULDER])
+    hip_x, hip_y = _mean(points[L_HIP], points[R_HIP])
+    trunk = math.hypot(hip_x - shoulder_x, hip_y - shoulder_y)
+    leg = leg_down = math.nan
     for hip, knee, ankle in _LEGS:
         length = math.dist(points[hip], points[knee]) + math.dist(points[knee], points[ankle])
-        if not length <= leg:  # also while leg is NaN
-            leg = length if not math.isnan(length) else leg
-    upright = trunk_y > abs(trunk_x)
-    if not math.isnan(trunk) and not math.isnan(leg):
-        length = trunk + leg
-    elif not math.isnan(trunk):
+        if length > leg or math.isnan(leg):
+            leg = length
+            leg_down = points[ankle][1] - points[hip][1]
+    if math.isnan(trunk):
+        length = leg * (1.0 + 1.0 / LEG_PER_TRUNK)
+    elif math.isnan(leg):
         length = trunk * (1.0 + LEG_PER_TRUNK)
     else:
-        length = leg * (1.0 + 1.0 / LEG_PER_TRUNK)
-    return (length if length > 0.0 else math.nan), upright
+        length = trunk + leg
+    if not length > 0.0:
+        return math.nan, _Posture.OTHER
+    trunk_down = hip_y - shoulder_y
+    if not trunk_down > abs(hip_x - shoulder_x):
+        return length, _Posture.OTHER
+    width = math.dist(points[L_SHOULDER], points[R_SHOULDER])
+    if trunk_down + leg_down > _STRETCHED * length and width < _BROADEST * trunk:
+        return length, _Posture.STANDING
+    return length, _Posture.UPRIGHT
 
 
-def _trunk(points: list[list[float]]) -> tuple[float, float]:
-    """Vector from the middle of the shoulders to the middle of the hips [px]."""
-    ends = []
-    for left, right in ((L_SHOULDER, R_SHOULDER), (L_HIP, R_HIP)):
-        seen = [p for p in (points[left], points[right]) if not math.isnan(p[0])]
-        if not seen:
-            return math.nan, math.nan
-        ends.append((sum(p[0] for p in seen) / len(seen), sum(p[1] for p in seen) / len(seen)))
-    return ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]
+def _mean(left: list[float], right: list[float]) -> tuple[float, float]:
+    """Mean of two points; where one is NaN, the other."""
+    if math.isnan(left[0]):
+        left = right
+    elif math.isnan(right[0]):
+        right = left
+    return (left[0] + right[0]) * 0.5, (left[1] + right[1]) * 0.5

@@ -15,17 +15,19 @@ class BodyScaleConfig(Section):
     settle_s: float = Field(default=0.5, gt=0, le=10)
     """Time from the first sight of a person during which the length is the median of all measurements so far."""
     grow_s: float = Field(default=0.5, gt=0, le=60)
-    """Time constant with which the length follows larger measurements."""
+    """Time constant with which the length follows larger measurements with an upright trunk."""
+    stand_s: float = Field(default=3.0, gt=0, le=3600)
+    """Time constant for smaller measurements of somebody who plainly stands, and for larger ones of one who does not."""
     shrink_s: float = Field(default=20.0, gt=0, le=3600)
-    """Time constant with which the length follows smaller measurements, and only while the trunk is upright."""
+    """Time constant with which the length follows other smaller measurements with an upright trunk."""
 
 
 class CleaningConfig(Section):
     """`[perception.cleaning]`: from detections at any rate to clean keypoints at 30 Hz."""
 
-    min_confidence: float = Field(default=0.1, ge=0, lt=1)
+    min_confidence: float = Field(default=0.15, ge=0, lt=1)
     """A detection with less confidence than this counts as missing."""
-    max_speed_body_lengths_s: float = Field(default=6.0, gt=0, le=100)
+    max_speed_body_lengths_s: float = Field(default=5.0, gt=0, le=100)
     """A keypoint that moves faster than this counts as missing [body lengths per second]."""
     fill_s: float = Field(default=0.2, gt=0.05, le=1.0)
     """A missing keypoint continues its line for this long; after that it is lost. Frames further apart restart all."""
