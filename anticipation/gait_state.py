@@ -7,7 +7,7 @@ one pass over T frames gives the answers of all its T - 14 windows.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -199,3 +199,7 @@ class DirectedGraphNetwork(nn.Module):
         """Logits (B, T - 14, 3) of frames (B, T, 12, C), T >= 15."""
         logits: Tensor = self.head(self.dropout(self.embedding(frames)))
         return logits
+
+
+CLASSIFIERS: Final[Mapping[str, Callable[..., nn.Module]]] = {"dgnn": DirectedGraphNetwork}
+"""Classifiers by the name a checkpoint carries; the constructor takes the module's `settings`."""

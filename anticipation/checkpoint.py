@@ -1,0 +1,214 @@
+"""One safetensors file with everything a predictor needs, described by a JSON header. No pickle.
+
+    forecaster/...   classifier/...    network parameters
+    plane/...        statistics/...    arrays of the transient plane and of the training poses
+    temperature                        (16,) calibration, one per step
+
+The header's entry `surefoot` holds the format version, the class and keypoint order, the architectures
+with their settings, and where the weights come from.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final, Literal
+
+import numpy as np
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save as to_bytes
+from torch import Tensor, nn
+
+from anticipation.gait_state import CLASSIFIERS
+from anticipation.motion import BASELINES, FORECASTERS, HORIZON, WINDOW, Forecast
+from anticipation.quality import PoseStatistics
+from anticipation.transient import TransientPlane
+from bridge.errors import CheckpointError
+from bridge.messages import CLASSES, STEPS, Floats, frozen
+from perception.skeleton import NAMES
+
+FORMAT: Final = 1
+SHIPPED: Final = Path(__file__).parent / "weights" / "default.safetensors"
+_HEADER: Final = "surefoot"
+_NETWORKS: Final = ("forecaster", "classifier")
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where the weights come from, for people who have to decide whether they may use them."""
+
+    data: tuple[str, ...] = ()  # names of the data sets
+    licence: str = ""
+    protocol: str = ""  # how training and test were split
+    metrics: Mapping[str, Any] = field(default_factory=dict)  # whatever JSON can say
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """The networks with the arrays that belong to them."""
+
+    forecaster: nn.Module | str  # a module registered in FORECASTERS, or a name from BASELINES
+    classifier: nn.Module  # registered in CLASSIFIERS
+    plane: TransientPlane
+    statistics: PoseStatistics
+    temperature: Floats  # (16,) logits of step k are divided by temperature[k]
+    provenance: Provenance = Provenance()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "temperature", frozen(self.temperature, (STEPS,), "temperature"))
+        if not (np.isfinite(self.temperature) & (self.temperature > 0)).all():
+            raise ValueError("temperature is not positive and finite")
+
+    @property
+    def forecast(self) -> Forecast:
+        """The forecaster as a function (B, 15, 12, 2) -> (B, 15, 12, 2)."""
+        return BASELINES[self.forecaster] if isinstance(self.forecaster, str) else self.forecaster
+
+
+def save(checkpoint: Checkpoint, path: Path, storage: Literal["float16", "float32"] = "float16") -> None:
+    """Write `checkpoint` to `path`: whole or not at all.
+
+    Network matrices are stored as `storage` and restored to float32; vectors, norms and the plane keep their precision.
+    """
+    arrays: dict[str, Floats] = {"temperature": checkpoint.temperature}
+    arrays |= {f"plane/{name}": array for name, array in checkpoint.plane.arrays().items()}
+    arrays |= {f"statistics/{name}": array for name, array in checkpoint.statistics.arrays().items()}
+    tensors = {name: torch.tensor(np.array(array, order="C")) for name, array in arrays.items()}
+    header: dict[str, Any] = {
+        "format": FORMAT,
+        "classes": list(CLASSES),
+        "keypoints": list(NAMES),
+        "window": WINDOW,
+        "horizon": HORIZON,
+        "plane": {"features": checkpoint.plane.features},
+        "data": list(checkpoint.provenance.data),
+        "licence": checkpoint.provenance.licence,
+        "protocol": checkpoint.provenance.protocol,
+        "metrics": dict(checkpoint.provenance.metrics),
+    }
+    for part in _NETWORKS:
+        network = getattr(checkpoint, part)
+        header[part] = _describe(network)
+        if isinstance(network, nn.Module):
+            tensors |= {f"{part}/{name}": _stored(value, storage) for name, value in network.state_dict().items()}
+    _write(path, to_bytes(tensors, metadata={_HEADER: json.dumps(header)}))
+
+
+def load(path: Path | None = None) -> Checkpoint:
+    """Read a checkpoint; None means the weights that come with the package. Networks are returned in evaluation mode.
+
+    Raises:
+        CheckpointError: missing, damaged, of another format or order, or with arrays that do not fit.
+    """
+    path = SHIPPED if path is None else path
+    header, tensors = _read(path)
+    _require(path, header, "classes", list(CLASSES))
+    _require(path, header, "keypoints", list(NAMES))
+    _require(path, header, "window", WINDOW)
+    _require(path, header, "horizon", HORIZON)
+    damaged = [name for name, value in tensors.items() if not torch.isfinite(value).all()]
+    if damaged:
+        raise CheckpointError(f"{path}: '{damaged[0]}' is not finite")
+    try:
+        return Checkpoint(
+            forecaster=_built(header["forecaster"], FORECASTERS, _part(tensors, "forecaster")),
+            classifier=_built(header["classifier"], CLASSIFIERS, _part(tensors, "classifier")),
+            plane=TransientPlane.from_arrays(_arrays(tensors, "plane"), header["plane"]["features"]),
+            statistics=PoseStatistics.from_arrays(_arrays(tensors, "statistics")),
+            temperature=tensors["temperature"].double().numpy(),
+            provenance=Provenance(tuple(header["data"]), header["licence"], header["protocol"], header["metrics"]),
+        )
+    except KeyError as error:
+        raise CheckpointError(f"{path}: {error} is missing or not known to this version") from None
+    except (ValueError, TypeError, RuntimeError) as error:
+        raise CheckpointError(f"{path}: {_one_line(error)}") from None
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    if not path.is_file():
+        raise CheckpointError(f"{path}: no such checkpoint")
+    try:
+        with safe_open(path, framework="pt") as file:
+            text = (file.metadata() or {}).get(_HEADER)
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (no mapping)
+    except (SafetensorError, OSError) as error:
+        raise CheckpointError(f"{path}: not a whole safetensors file ({_one_line(error)})") from None
+    if text is None:
+        raise CheckpointError(f"{path}: a safetensors file, but not a checkpoint of Surefoot (no '{_HEADER}' header)")
+    try:
+        header = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise CheckpointError(f"{path}: header is not JSON ({error})") from None
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        found = header.get("format") if isinstance(header, dict) else None
+        raise CheckpointError(f"{path}: checkpoint format is {found}, this version reads {FORMAT}")
+    return header, tensors
+
+
+def _require(path: Path, header: Mapping[str, Any], name: str, expected: object) -> None:
+    if header.get(name) != expected:
+        raise CheckpointError(f"{path}: {name} are {header.get(name)}, expected {expected}")
+
+
+def _describe(network: nn.Module | str) -> dict[str, Any]:
+    if isinstance(network, str):
+        return {"name": network}
+    for name, kind in (*FORECASTERS.items(), *CLASSIFIERS.items()):
+        if type(network) is kind:
+            return {"name": name, "settings": network.settings}
+    raise ValueError(f"{type(network).__name__} is not a registered network")
+
+
+def _built(description: Mapping[str, Any], registry: Mapping[str, Any], state: dict[str, Tensor]) -> Any:
+    name = description["name"]
+    if registry is FORECASTERS and name in BASELINES:
+        return name
+    network: nn.Module = registry[name](**description["settings"])
+    network.load_state_dict(state, strict=True)
+    return network.eval().requires_grad_(False)
+
+
+def _stored(value: Tensor, storage: str) -> Tensor:
+    wide = value.is_floating_point() and value.ndim >= 2
+    return value.detach().cpu().contiguous().to(getattr(torch, storage) if wide else value.dtype)
+
+
+def _part(tensors: Mapping[str, Tensor], part: str) -> dict[str, Tensor]:
+    return {
+        name.removeprefix(f"{part}/"): value.float() if value.is_floating_point() else value
+        for name, value in tensors.items()
+        if name.startswith(f"{part}/")
+    }
+
+
+def _arrays(tensors: Mapping[str, Tensor], part: str) -> dict[str, Floats]:
+    prefix = f"{part}/"
+    return {name.removeprefix(prefix): value.numpy() for name, value in tensors.items() if name.startswith(prefix)}
+
+
+def _one_line(error: Exception) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return " ".join(lines[:2])
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Write to a temporary file beside `path`, flush it to the disk and rename it."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        Path(temporary).chmod(0o644)  # mkstemp's 0o600 would hide shipped weights from other users
+        Path(temporary).replace(path)
+    except BaseException:
+        with suppress(OSError):
+            Path(temporary).unlink()
+        raise

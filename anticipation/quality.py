@@ -1,0 +1,129 @@
+"""How far the input resembles what the networks were trained on: 1 as in training, 0 not to be relied on.
+
+Three causes lower it, each a factor in 0..1: keypoints that were not measured, more than one person in
+view, and poses unlike any in training.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bridge.config.anticipation import QualityConfig
+from bridge.messages import KEYPOINTS, Floats, KeypointStatus
+from perception.skeleton import LINKS
+
+_TRIMMED: Final = 0.02  # share of the training poses left out as detector errors
+_RARE: Final = 0.99  # quantile of the training poses that still counts as seen
+
+_WEIGHT: Final = np.zeros(3)
+_WEIGHT[KeypointStatus.MEASURED] = 1.0
+_WEIGHT[KeypointStatus.FILLED] = 0.5  # continued along a line: better than nothing, worse than seen
+
+
+@dataclass(frozen=True)
+class PoseStatistics:
+    """What poses looked like in training: a Gaussian over coordinates and link lengths.
+
+    A pose is described by its 24 relative coordinates and its 12 link lengths (36 numbers, body lengths):
+    the coordinates alone would find a skeleton that collapsed into one point unremarkable.
+    """
+
+    mean: Floats  # (36,)
+    whitening: Floats  # (36, 36): the distance of a pose is |(x - mean) @ whitening| / 6, about 1 in training
+    limit: float  # distance that one training pose in a hundred exceeds
+
+    def __post_init__(self) -> None:
+        for name, shape in (("mean", (36,)), ("whitening", (36, 36))):
+            array = np.array(getattr(self, name), dtype=np.float64)
+            if array.shape != shape:
+                raise ValueError(f"pose statistics: {name} has shape {array.shape}, expected {shape}")
+            if not np.isfinite(array).all():
+                raise ValueError(f"pose statistics: {name} is not finite")
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        if not 0 < self.limit < np.inf:
+            raise ValueError(f"pose statistics: limit is {self.limit}, expected a positive number")
+
+    @classmethod
+    def fit(cls, poses: NDArray[np.floating]) -> Self:
+        """Fit on relative coordinates (N, 12, 2) of whole skeletons, N >= 100.
+
+        Fitted twice: poses far from the first fit are detector errors and are left out of the second.
+        The covariance is shrunk towards a multiple of the identity (Ledoit and Wolf, 2004).
+
+        Raises:
+            ValueError: too few poses, or some are not finite.
+        """
+        X = _describe(np.asarray(poses, dtype=np.float64).reshape(-1, KEYPOINTS, 2))
+        if len(X) < 100 or not np.isfinite(X).all():
+            raise ValueError(f"pose statistics need 100 finite poses or more, got {int(np.isfinite(X).all(1).sum())}")
+        distance = _distance(X, *_gaussian(X))
+        mean, whitening = _gaussian(X[distance <= np.quantile(distance, 1.0 - _TRIMMED)])
+        limit = np.quantile(_distance(X, mean, whitening), _RARE)
+        return cls(mean=mean, whitening=whitening, limit=float(limit))
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[np.float64]]) -> Self:
+        """Rebuild from what `arrays` returned."""
+        return cls(mean=arrays["mean"], whitening=arrays["whitening"], limit=float(arrays["limit"]))
+
+    def arrays(self) -> dict[str, NDArray[np.float64]]:
+        """Return the arrays by name."""
+        return {"mean": self.mean, "whitening": self.whitening, "limit": np.array(self.limit)}
+
+    @property
+    def mean_pose(self) -> Floats:
+        """Mean relative coordinates (12, 2)."""
+        return self.mean[: 2 * KEYPOINTS].reshape(KEYPOINTS, 2)
+
+    def strangeness(self, poses: NDArray[np.floating]) -> Floats:
+        """Distance of each pose (N, 12, 2) from those in training, as a multiple of the limit: (N,)."""
+        return _distance(_describe(poses), self.mean, self.whitening) / self.limit
+
+
+def _gaussian(X: Floats) -> tuple[Floats, Floats]:
+    """Mean and whitening matrix of the rows of X."""
+    from sklearn.covariance import ledoit_wolf  # noqa: PLC0415 (only fitting needs it)
+
+    covariance, _ = ledoit_wolf(X)
+    return X.mean(axis=0), np.linalg.cholesky(np.linalg.inv(covariance))
+
+
+def _describe(poses: NDArray[np.floating]) -> Floats:
+    bones = poses[:, LINKS[:, 1]] - poses[:, LINKS[:, 0]]
+    return np.concatenate((poses.reshape(len(poses), -1), np.hypot(bones[..., 0], bones[..., 1])), axis=1)
+
+
+def _distance(X: Floats, mean: Floats, whitening: Floats) -> Floats:
+    distance: Floats = np.linalg.norm((X - mean) @ whitening, axis=1) / np.sqrt(len(mean))
+    return distance
+
+
+def measured_share(status: NDArray[np.uint8]) -> float:
+    """Share of keypoints that were measured, a filled one counting half: status (..., 12) -> 0..1."""
+    return float(_WEIGHT[status].mean())
+
+
+def quality(config: QualityConfig, status: NDArray[Any], strangeness: Floats, people: int) -> float:
+    """Quality 0..1 of a window.
+
+    Args:
+        config: where each factor begins to fall and where it reaches 0.
+        status: (15, 12) KeypointStatus.
+        strangeness: (15,) from `PoseStatistics.strangeness`.
+        people: how many people the detector saw in the newest frame.
+    """
+    seen = _ramp(measured_share(status), config.measured_share_zero, config.measured_share_full)
+    known = _ramp(float(strangeness.mean()), config.strangeness_zero, config.strangeness_full)
+    alone = 1.0 if people <= 1 else config.several_people
+    return seen * known * alone
+
+
+def _ramp(value: float, zero: float, full: float) -> float:
+    """0 at `zero`, 1 at `full`, straight between and constant beyond."""
+    return min(1.0, max(0.0, (value - zero) / (full - zero)))

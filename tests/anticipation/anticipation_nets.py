@@ -1,0 +1,47 @@
+"""Small networks with random weights, for tests that care about the machinery and not about the answers."""
+
+import numpy as np
+import torch
+
+from anticipation.checkpoint import Checkpoint, Provenance
+from anticipation.gait_state import DirectedGraphNetwork
+from anticipation.motion import DctMlpForecaster
+from anticipation.quality import PoseStatistics
+from anticipation.transient import TransientPlane
+
+STANDING = np.array(  # l/r shoulder, elbow, wrist, hip, knee, ankle; about one body length tall, y down
+    [
+        (0.10, -0.16), (-0.10, -0.16), (0.14, 0.02), (-0.14, 0.02), (0.15, 0.18), (-0.15, 0.18),
+        (0.07, 0.16), (-0.07, 0.16), (0.08, 0.46), (-0.08, 0.46), (0.08, 0.74), (-0.08, 0.74),
+    ]
+)  # fmt: skip
+
+
+def poses(count: int, seed: int = 0) -> np.ndarray:
+    """Standing figures turned by up to a right angle, of varied size, with noise: (count, 12, 2)."""
+    random = np.random.default_rng(seed)
+    angle = random.uniform(-np.pi / 2, np.pi / 2, count)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]).transpose(2, 0, 1)
+    size = random.uniform(0.9, 1.1, (count, 1, 1))
+    return (STANDING @ turn) * size + random.normal(0, 0.02, (count, 12, 2))
+
+
+def random_checkpoint(seed: int = 0, features: str = "window") -> Checkpoint:
+    """A checkpoint of the shipped kind whose networks were never trained."""
+    torch.manual_seed(seed)
+    random = np.random.default_rng(seed)
+    classifier = DirectedGraphNetwork()
+    labels = np.arange(600) % 3
+    seen = random.normal(size=(600, 360 if features == "window" else 128))
+    seen[:, 0] += 40 * labels
+    seen[:, 1] += 40 * (labels == 1)
+    forecaster = DctMlpForecaster(32, 2)
+    torch.nn.init.normal_(forecaster.leave.weight, std=0.01)
+    return Checkpoint(
+        forecaster=forecaster.eval(),
+        classifier=classifier.eval(),
+        plane=TransientPlane.fit(seen, labels, features),
+        statistics=PoseStatistics.fit(poses(500)),
+        temperature=np.linspace(1.0, 1.5, 16),
+        provenance=Provenance(("made up",), "none", "none", {"accuracy": [0.3, 0.4]}),
+    )
