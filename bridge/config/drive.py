@@ -25,7 +25,7 @@ class DriveConfig(Section):
     """Column height at the start [m]."""
 
     script: Literal["zero", "walk", "push", "fall"] = "walk"
-    """What the person does to the walker: nothing, lean and push along, be pushed sideways, or fall into the harness."""
+    """What the person does to the walker: nothing, walk along, be pushed sideways, or fall into the harness."""
 
     walk_force_n: float = Field(default=12.0, ge=0, le=200)
     """Mean forward push of a walking person [N]; assumed."""
