@@ -1,5 +1,7 @@
 """Small networks with random weights, for tests that care about the machinery and not about the answers."""
 
+from functools import cache
+
 import numpy as np
 import torch
 
@@ -26,22 +28,34 @@ def poses(count: int, seed: int = 0) -> np.ndarray:
     return (STANDING @ turn) * size + random.normal(0, 0.02, (count, 12, 2))
 
 
+@cache
+def random_plane(features: str) -> TransientPlane:
+    """A plane fitted on three clouds along a bent line."""
+    random = np.random.default_rng(0)
+    labels = np.arange(300) % 3
+    seen = random.normal(size=(300, 360 if features == "window" else 128))
+    seen[:, 0] += 40 * labels
+    seen[:, 1] += 40 * (labels == 1)
+    return TransientPlane.fit(seen, labels, features)
+
+
+@cache
+def pose_statistics() -> PoseStatistics:
+    """What `poses` looks like."""
+    return PoseStatistics.fit(poses(500))
+
+
 def random_checkpoint(seed: int = 0, features: str = "window") -> Checkpoint:
     """A checkpoint of the shipped kind whose networks were never trained."""
     torch.manual_seed(seed)
-    random = np.random.default_rng(seed)
     classifier = DirectedGraphNetwork()
-    labels = np.arange(600) % 3
-    seen = random.normal(size=(600, 360 if features == "window" else 128))
-    seen[:, 0] += 40 * labels
-    seen[:, 1] += 40 * (labels == 1)
     forecaster = DctMlpForecaster(32, 2)
     torch.nn.init.normal_(forecaster.leave.weight, std=0.01)
     return Checkpoint(
         forecaster=forecaster.eval(),
         classifier=classifier.eval(),
-        plane=TransientPlane.fit(seen, labels, features),
-        statistics=PoseStatistics.fit(poses(500)),
+        plane=random_plane(features),
+        statistics=pose_statistics(),
         temperature=np.linspace(1.0, 1.5, 16),
         provenance=Provenance(("made up",), "none", "none", {"accuracy": [0.3, 0.4]}),
     )
