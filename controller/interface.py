@@ -19,7 +19,7 @@ class Decision(NamedTuple):
     stiffening: float  # present s in [0, 1]
     profile: Floats  # (N,) read-only, s of stage k at now + k * stage_s, in [0, 1]
     fall_distance: float  # least distance to the fall boundary over the horizon [within-class sd], NaN if unknown
-    fall_probability: float  # largest fall probability over the horizon, NaN if unknown
+    fall_probability: float  # probability of fall at the end of the horizon, NaN if unknown
     rests_on_ns: int  # stamp of the newest frame behind the horizon [ns since the epoch], 0 if there was none
 
     @property

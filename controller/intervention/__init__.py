@@ -1,1 +1,1 @@
-"""From fall-state horizon to stiffening profile and supervisor state."""
+"""From the fall-state horizon to a decision: risk, stiffening, supervisor. Pure: `now` and messages in, values out."""
