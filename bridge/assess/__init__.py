@@ -1,0 +1,1 @@
+"""Offline assessment of keypoint recordings through the code that runs live."""
