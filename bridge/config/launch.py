@@ -37,14 +37,24 @@ class LaunchConfig(Section):
     stop_timeout_s: float = Field(default=3.0, gt=0, le=60)
     """How long a process may take to stop before it is killed [s]."""
 
+    ready_timeout_s: float = Field(default=30.0, gt=0, le=600)
+    """Perception starts once the other roles are up, so that none misses the start of a file; or after this long [s]."""
+
+    log_dir: str = Field(default="runs/logs", min_length=1)
+    """Folder for what the processes write, one `ROLE.log` each; older text moves to `ROLE.log.1`."""
+
     @field_validator("modules", mode="before")
     @classmethod
     def _add_defaults(cls, value: Any) -> Any:
         return {**DEFAULT_MODULES, **value} if isinstance(value, dict) else value
 
     @model_validator(mode="after")
-    def _know_every_module(self) -> Self:
+    def _check_roles(self) -> Self:
+        if not self.roles:
+            raise ValueError("roles is empty, so there is nothing to start")
         for role in self.roles:
+            if self.roles.count(role) > 1:
+                raise ValueError(f"roles names '{role}' more than once")
             if role not in self.modules:
                 raise ValueError(f"roles names '{role}', but modules.{role} is not set")
         return self

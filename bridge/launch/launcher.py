@@ -9,7 +9,7 @@ import sys
 import tempfile
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from types import TracebackType
@@ -25,6 +25,7 @@ BAD_INPUT = SurefootError.exit_code
 class Phase(StrEnum):
     """Where a process is in its life."""
 
+    WAITING = "waiting"  # not started yet
     RUNNING = "running"
     FINISHED = "finished"  # exit code 0: nothing left to do
     REFUSED = "refused"  # exit code 2: bad input, said in one line
@@ -47,6 +48,7 @@ class ProcessState(NamedTuple):
 class Launcher:
     """Runs the roles of `launch.roles` as processes, each in a session of its own.
 
+    As a context manager it leaves nothing behind; it starts nothing by itself.
     Call `start` and `poll` from one thread that lives as long as the processes
     should: the kernel kills a child when the thread that started it ends.
     """
@@ -84,11 +86,11 @@ class Launcher:
             for role in self._launch.roles
         }
 
-    def start(self) -> None:
-        """Start every role that is not running."""
-        for child in self._children.values():
-            if child.phase is not Phase.RUNNING:
-                child.start()
+    def start(self, roles: Iterable[str] | None = None) -> None:
+        """Start those of `roles` (None: all) that are not running."""
+        for role in self._children if roles is None else roles:
+            if self._children[role].phase is not Phase.RUNNING:
+                self._children[role].start()
 
     def poll(self) -> dict[str, ProcessState]:
         """Start again what died, within the limit, and return how every role is."""
@@ -117,11 +119,6 @@ class Launcher:
             self._temporary.cleanup()
 
     def __enter__(self) -> Self:
-        try:
-            self.start()
-        except BaseException:
-            self.close()
-            raise
         return self
 
     def __exit__(
@@ -144,7 +141,7 @@ class _Child:
         self.role, self._arguments, self._log = role, tuple(arguments), log
         self._process: subprocess.Popen[bytes] | None = None
         self._exit_code: int | None = None
-        self.phase = Phase.STOPPED
+        self.phase = Phase.WAITING
         self.restarts: deque[float] = deque()  # recent, monotonic [s]
         self.total_restarts = 0
 
