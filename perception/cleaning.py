@@ -105,6 +105,16 @@ class Cleaner:
             for tick in self._grid.push(points)
         ]
 
+    @property
+    def body_length_px(self) -> float:
+        """Body length after the newest frame [px]; NaN until trunk or legs were seen once."""
+        return self._scale.length_px
+
+    def forget_person(self) -> None:
+        """Begin anew with somebody else, on the same grid of ticks."""
+        self._lines = _Lines(self._config)
+        self._scale.reset()
+
     def _restart(self) -> None:
         """Forget all motion, but not the person's size."""
         self._lines = _Lines(self._config)

@@ -17,7 +17,7 @@ class BodyScaleConfig(Section):
     grow_s: float = Field(default=0.5, gt=0, le=60)
     """Time constant with which the length follows larger measurements with an upright trunk."""
     stand_s: float = Field(default=3.0, gt=0, le=3600)
-    """Time constant for smaller measurements of somebody who plainly stands, and for larger ones of one who does not."""
+    """Time constant for smaller measurements of one who plainly stands, and for larger ones of one who does not."""
     shrink_s: float = Field(default=20.0, gt=0, le=3600)
     """Time constant with which the length follows other smaller measurements with an upright trunk."""
 
@@ -46,6 +46,8 @@ class TrackingConfig(Section):
     """A detection whose keypoints moved further than this from the last sight is another person [body lengths]."""
     gate_speed_body_lengths_s: float = Field(default=2.0, ge=0, le=20)
     """The gate widens by this much for every second without a sight [body lengths per second]."""
+    gate_most_body_lengths: float = Field(default=1.5, gt=0, le=20)
+    """The gate never gets wider than this [body lengths]."""
     min_keypoints: int = Field(default=4, ge=2, le=12)
     """A detection with fewer usable keypoints is not a person."""
     relock_s: float = Field(default=3.0, gt=0, le=3600)
@@ -72,8 +74,8 @@ class SourceConfig(Section):
 class MovenetConfig(Section):
     """`[perception.movenet]`: MoveNet SinglePose through LiteRT."""
 
-    weights: str = ""
-    """Path of the `.tflite` file; "" = not set."""
+    weights: str = "../shared/data/weights/movenet_lightning_int8.tflite"
+    """Path of the `.tflite` file, relative to the working directory; "" = not set."""
     crop_min_score: float = Field(default=0.2, ge=0, le=1)
     """Keypoints with less score than this do not place the crop of the next frame."""
     min_score: float = Field(default=0.15, ge=0, le=1)

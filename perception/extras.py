@@ -1,0 +1,27 @@
+"""Optional packages, loaded when first needed and missed by name."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from bridge.errors import MissingExtraError
+
+
+def load_extra(module: str, what: str, package: str, extra: str) -> Any:
+    """Return the imported `module`.
+
+    Raises:
+        MissingExtraError: `package` is not installed; says that `what` needs it and which extra brings it.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise MissingExtraError(what, package, extra) from error
+
+
+def load_opencv(what: str) -> Any:
+    """Return `cv2`, on one thread, so that it does not compete with the networks for cores."""
+    cv2 = load_extra("cv2", what, "opencv-python-headless", "video")
+    cv2.setNumThreads(1)
+    return cv2

@@ -1,0 +1,1 @@
+"""Where frames come from: keypoint files, videos, folders of images, cameras."""

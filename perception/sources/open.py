@@ -1,0 +1,52 @@
+"""From the text a user gives to the source it means."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from bridge.clock import Clock
+from bridge.config.perception import SourceConfig
+from bridge.errors import SourceError
+from perception.sources.camera import open_camera
+from perception.sources.frame import Source
+from perception.sources.image_folder import open_folder
+from perception.sources.keypoint_file import read_clip, stills
+from perception.sources.picture import check_crop
+from perception.sources.playback import Playback
+from perception.sources.video_file import open_video
+
+_NPZ = re.compile(r"^(?P<file>.+\.npz)(?::(?P<clip>.*))?$")
+_CAMERA = re.compile(r"^camera:(?P<number>\d+)$")
+_URL = re.compile(r"^(https?|rtsps?|rtmp|udp|tcp)://")
+_FORMS = "FILE.npz:CLIP[/ARRAY], a video file, a folder of images, camera:N or a URL"
+
+
+def open_source(spec: str, config: SourceConfig, clock: Clock) -> Source:
+    """Open the source that `spec` names.
+
+    Args:
+        spec: `FILE.npz:CLIP[/ARRAY]`, a video file, a folder of images, `camera:N`, or a URL (http, rtsp, rtmp, udp, tcp).
+        config: crop, pacing, and what files may lack.
+        clock: stamps the frames of cameras.
+
+    Raises:
+        SourceError: one line saying what is wrong with it.
+        MissingExtraError: images are to be read and OpenCV is not installed.
+    """
+    crop = None if config.crop_px is None else check_crop(config.crop_px)
+    if not spec:
+        raise SourceError(f"no source given: set --source or perception.source.uri to {_FORMS}")
+    if (npz := _NPZ.match(spec)) is not None:
+        clip = read_clip(Path(npz["file"]), npz["clip"] or "", config)
+        return Playback(spec, stills(clip), paced=config.paced)
+    if (camera := _CAMERA.match(spec)) is not None:
+        return open_camera(int(camera["number"]), crop, clock)
+    if _URL.match(spec):
+        return open_camera(spec, crop, clock)
+    path = Path(spec)
+    if path.is_dir():
+        return Playback(spec, open_folder(path, crop, config.fps_hz), paced=config.paced)
+    if path.is_file():
+        return Playback(spec, open_video(path, crop, config.fps_hz), paced=config.paced)
+    raise SourceError(f"source '{spec}': no such file or folder; expected {_FORMS}")
