@@ -137,7 +137,8 @@ class SafetyGate:
             return str(error)
         if not (np.isfinite(command.damping).all() and np.isfinite(command.stiffness).all()):
             return "command damping or stiffness is not finite"
-        return self._judge_time(command, now_ns) or self._judge_values(command)
+        late = self._judge_time(command, now_ns)
+        return late if late or not command.valid else self._judge_values(command)
 
     def _judge_time(self, command: SupportCommand, now_ns: int) -> str:
         age_ms = (now_ns - command.stamp_ns) / 1e6

@@ -36,7 +36,7 @@ class Intervention:
         self._supervisor = supervisor
         self._stage_s = stage_s
         self._ahead_s: Floats = np.linspace(0.0, (stages - 1) * stage_s, stages)
-        self._near = self._ahead_s <= supervisor.arrest_reach_s
+        self._near_stages = int(np.count_nonzero(self._ahead_s <= supervisor.arrest_reach_s))
         self._known = KnownRisk(intervention)
         self._horizon: InputWatch[FallHorizon] = InputWatch("horizon", supervisor.horizon_age_limit_s)
         self._wrench: InputWatch[Wrench] = InputWatch("wrench", supervisor.wrench_age_limit_s)
@@ -74,7 +74,7 @@ class Intervention:
         risk = self._known.ahead(now_ns, self._ahead_s)
         evidence = self._evidence(now_ns, risk, fault)
         self._status = advance(self._status, evidence, now_ns, self._supervisor)
-        profile = self._profile(now_ns, risk)
+        profile = self._profile(now_ns, risk, fault)
         newest = None if horizon_fault else self._horizon.message
         return Decision(
             state=self._status.state,
@@ -87,38 +87,46 @@ class Intervention:
         )
 
     def _evidence(self, now_ns: int, risk: Floats, fault: str) -> Evidence:
-        near = int(np.argmax(np.where(self._near, risk, -1.0)))
-        ahead = int(np.argmax(risk))
+        near, ahead = int(risk[: self._near_stages].argmax()), int(risk.argmax())
         wrench, odometry = self._wrench.message, self._odometry.message
         return Evidence(
             fault=fault,
             risk_near=float(risk[near]),
             risk_ahead=float(risk[ahead]),
-            why_near=self._known.words(now_ns, float(self._ahead_s[near]), float(risk[near])),
-            why_ahead=self._known.words(now_ns, float(self._ahead_s[ahead]), float(risk[ahead])),
+            why_near=self._words(now_ns, near, risk, self._supervisor.arrest_on),
+            why_ahead=self._words(now_ns, ahead, risk, self._supervisor.guard_on),
             load_n=0.0 if wrench is None else -float(wrench.force[2]),
             descent_m_s=0.0 if odometry is None else -float(odometry.velocity[2]),
             relaxed=self._relaxed,
         )
 
-    def _profile(self, now_ns: int, risk: Floats) -> Floats:
+    def _words(self, now_ns: int, stage: int, risk: Floats, limit: float) -> str:
+        """Say what makes up the risk at `stage`; '' below `limit`, where nobody asks."""
+        if risk[stage] < limit:
+            return ""
+        return self._known.words(now_ns, float(self._ahead_s[stage]), float(risk[stage]))
+
+    def _profile(self, now_ns: int, risk: Floats, fault: str) -> Floats:
         elapsed_s = 0.0 if self._now_ns is None else (now_ns - self._now_ns) / NS
         self._now_ns = now_ns
-        asked, rates = self._ask(risk)
+        asked, rates = self._ask(risk, stopped_by_fault=fault != "")
         profile = stiffening_profile(self._stiffening, asked, elapsed_s, self._stage_s, rates)
         self._stiffening = float(profile[0])
         self._relaxed = self._stiffening <= float(asked[0]) + RELAXED
         return profile
 
-    def _ask(self, risk: Floats) -> tuple[Floats, Rates]:
+    def _ask(self, risk: Floats, *, stopped_by_fault: bool) -> tuple[Floats, Rates]:
         """Return the stiffening that the state asks for at each stage, and the rates it may change at."""
         config, state = self._config, self._status.state
-        if state is GaitState.DISARMED:
-            return np.zeros_like(risk), Rates(config.rise_per_s, config.release_per_s)
+        free = Rates(config.rise_per_s, config.release_per_s)
         if state is GaitState.ARREST:
             return np.ones_like(risk), Rates(config.arrest_per_s, config.release_per_s)
-        if state is GaitState.SAFE_STOP:  # stiff, so that following begins stiff and softens from there
-            return np.ones_like(risk), Rates(config.rise_per_s, config.release_per_s)
+        if (
+            state is GaitState.SAFE_STOP
+        ):  # never softer than it was, so that following begins firm and softens from there
+            return np.maximum(risk, max(self._stiffening, config.unknown_risk)), free
         if state is GaitState.RECOVER:
-            return risk, Rates(config.rise_per_s, min(self._supervisor.recover_per_s, config.release_per_s))
-        return risk, Rates(config.rise_per_s, config.release_per_s)
+            return risk, free._replace(release=min(self._supervisor.recover_per_s, config.release_per_s))
+        if state is GaitState.DISARMED and stopped_by_fault:
+            return np.zeros_like(risk), free
+        return risk, free
