@@ -34,7 +34,7 @@ class Display(Protocol):
         ...
 
     def say(self, elapsed_s: float, text: str) -> None:
-        """Tell of something that happened."""
+        """Tell of something that happened; the next `show` shows."""
         ...
 
 
@@ -89,6 +89,7 @@ class Lines:
 
     def say(self, elapsed_s: float, text: str) -> None:
         """Print `text`; as JSON it is the record's `event`."""
+        self._due_s = elapsed_s
         record = {"elapsed_s": round(elapsed_s, 3), "event": text}
         self._print(json.dumps(record) if self._as_json else f"{elapsed_s:6.1f} s  {text}")
 

@@ -61,7 +61,7 @@ def watch_over(launcher: Launcher, config: SurefootConfig, display: Display, lim
     with StopSignals() as stop, display:
         transport = ZenohTransport(config.bridge, "monitor", clock)
         try:
-            watch = _Watch(launcher, Monitor(transport, clock), config, limits)
+            watch = Watch(launcher, Monitor(transport, clock), config, limits)
             while not (reason := watch.turn(stop.seen)):
                 display.show(watch.elapsed_s, watch.processes, watch.view)
                 if watch.news:
@@ -75,8 +75,8 @@ def watch_over(launcher: Launcher, config: SurefootConfig, display: Display, lim
     return [process for process in watch.processes.values() if process.phase is Phase.FAILED]
 
 
-class _Watch:
-    """What `watch_over` knows from one turn to the next."""
+class Watch:
+    """What `watch_over` knows from one turn to the next: which process to start, and when it is time to end."""
 
     def __init__(self, launcher: Launcher, monitor: Monitor, config: SurefootConfig, limits: Limits) -> None:
         self._launcher, self._monitor, self._limits = launcher, monitor, limits
