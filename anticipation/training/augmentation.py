@@ -1,0 +1,58 @@
+"""What the same motion could have looked like: mirrored, larger, tilted, noisier, with a point held.
+
+All on relative coordinates (B, T, 12, 2) in body lengths, whole samples at once, so that
+past, future and labels stay those of one motion.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import torch
+from torch import Tensor
+
+from perception.skeleton import MIRROR
+
+SCALE: Final = 0.12  # standard deviation of the log of the scale, per axis: body length and foreshortening
+TILT: Final = 0.10  # standard deviation of the camera's roll [rad]
+OFFSET: Final = 0.02  # standard deviation of a point's offset through a sample [body lengths]
+JITTER: Final = 0.006  # standard deviation from frame to frame [body lengths]
+HOLD: Final = 0.15  # probability that one point stands still for some frames
+LONGEST_HOLD: Final = 8  # frames
+
+
+def augment(poses: Tensor, generator: torch.Generator) -> Tensor:
+    """Return a changed copy of poses (B, T, 12, 2)."""
+    batch, frames = poses.shape[:2]
+
+    def normal(*shape: int) -> Tensor:
+        return torch.randn(*shape, generator=generator)
+
+    def uniform(*shape: int) -> Tensor:
+        return torch.rand(*shape, generator=generator)
+
+    mirrored = poses[:, :, torch.from_numpy(MIRROR.copy())] * torch.tensor([-1.0, 1.0])
+    poses = torch.where(uniform(batch, 1, 1, 1) < 0.5, mirrored, poses)
+    common, each = SCALE * normal(batch, 1, 1, 1), 0.5 * SCALE * normal(batch, 1, 1, 2)
+    poses = poses * torch.exp(common + each)
+    angle = TILT * normal(batch)
+    turn = torch.stack([angle.cos(), -angle.sin(), angle.sin(), angle.cos()], dim=1).reshape(batch, 1, 2, 2)
+    poses = poses @ turn.mT
+    poses = poses + OFFSET * normal(batch, 1, 12, 2) + JITTER * normal(batch, frames, 12, 2)
+    return _hold(poses, uniform)
+
+
+def _hold(poses: Tensor, uniform: object) -> Tensor:
+    """Let one point of some samples stand still, as a lost point does when it is carried on."""
+    draw = uniform  # one generator for all draws keeps a seed reproducible
+    assert callable(draw)
+    batch, frames = poses.shape[:2]
+    point = (draw(batch) * 12).long()
+    first = (draw(batch) * (frames - LONGEST_HOLD)).long()
+    length = (draw(batch) * LONGEST_HOLD).long() * (draw(batch) < HOLD)
+    time = torch.arange(frames)
+    inside = (time >= first[:, None]) & (time < (first + length)[:, None])  # (B, T)
+    chosen = torch.nn.functional.one_hot(point, 12).bool()  # (B, 12)
+    held = poses[torch.arange(batch), first]  # (B, 12, 2)
+    mask = (inside[:, :, None] & chosen[:, None, :])[..., None]
+    return torch.where(mask, held[:, None], poses)

@@ -1,0 +1,89 @@
+"""What every data set becomes: clips of twelve keypoints with their origin."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bridge.errors import SourceError
+from bridge.messages import KEYPOINTS, Floats
+
+Labels = NDArray[np.int64]
+
+STABLE: Final = 0
+TRANSIENT: Final = 1
+FALL: Final = 2
+UNLABELLED: Final = -100  # the value torch's cross-entropy ignores
+
+
+@dataclass(frozen=True, slots=True)
+class Clip:
+    """One person in one recording, as an estimator saw it.
+
+    `group` names what must stay on one side of a split: everything filmed of the
+    same event, by whichever estimator it was tracked.
+    """
+
+    name: str
+    group: str
+    keypoints: Floats  # (N, 12, 3) x px, y px, confidence; NaN where not found
+    fps: float  # [Hz]
+    labels: Labels | None  # (N,) STABLE, TRANSIENT, FALL or UNLABELLED
+    width: int  # [px]
+    height: int  # [px]
+    source: str
+    licence: str
+
+    def __post_init__(self) -> None:
+        if self.keypoints.ndim != 3 or self.keypoints.shape[1:] != (KEYPOINTS, 3):
+            raise SourceError(f"{self.name}: keypoints have shape {self.keypoints.shape}, expected (N, {KEYPOINTS}, 3)")
+        if self.labels is not None and len(self.labels) != len(self.keypoints):
+            raise SourceError(f"{self.name}: {len(self.labels)} labels for {len(self.keypoints)} frames")
+
+    def stamps_ns(self) -> NDArray[np.int64]:
+        """Return the capture stamps of the frames, (N,) [ns], the first at zero."""
+        return np.round(np.arange(len(self.keypoints)) * (1e9 / self.fps)).astype(np.int64)
+
+
+def data_folder(option: Path | None) -> Path:
+    """Return the folder of the research data: the option, else `SUREFOOT_DATA`.
+
+    Raises:
+        SourceError: neither is set, or the folder is not there.
+    """
+    named = option or (Path(os.environ["SUREFOOT_DATA"]) if os.environ.get("SUREFOOT_DATA") else None)
+    if named is None:
+        raise SourceError("no research data: name its folder with --data or the environment variable SUREFOOT_DATA")
+    if not named.is_dir():
+        raise SourceError(f"no research data in '{named}': not a folder (--data or SUREFOOT_DATA)")
+    return named
+
+
+def required(folder: Path, relative: str) -> Path:
+    """Return `folder / relative`.
+
+    Raises:
+        SourceError: the file is not there.
+    """
+    path = folder / relative
+    if not path.is_file():
+        raise SourceError(f"research data is incomplete: '{relative}' is not in '{folder}' (--data or SUREFOOT_DATA)")
+    return path
+
+
+def load_arrays(path: Path) -> dict[str, NDArray[np.float64]]:
+    """Read the numeric arrays of an npz file, without pickle.
+
+    Raises:
+        SourceError: the file is damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return {name: np.asarray(archive[name], dtype=np.float64) for name in archive.files}
+    except (OSError, ValueError, EOFError, KeyError) as error:
+        raise SourceError(f"research data '{path}' cannot be read: {error}") from error

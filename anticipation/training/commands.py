@@ -1,0 +1,134 @@
+"""`surefoot train` and `surefoot evaluate`."""
+
+from __future__ import annotations
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import torch
+import typer
+from rich.console import Console
+
+from anticipation import checkpoint
+from anticipation.training import evaluation, production, report
+from anticipation.training.clips import data_folder
+from anticipation.training.corpus import read_corpus
+from anticipation.training.networks import progress_bars
+from anticipation.training.plan import plan_for
+from bridge.config.perception import CleaningConfig
+from bridge.errors import SurefootError
+
+
+class Forecaster(StrEnum):
+    """Forecasters that can be trained."""
+
+    LSTM = "lstm"
+    DCT_MLP = "dct_mlp"
+
+
+class Protocol(StrEnum):
+    """How recordings are divided into training and test."""
+
+    GROUPED = "grouped"
+    PAPER = "paper"
+
+
+class Keypoints(StrEnum):
+    """Whose tracks of the URFD falls are tested."""
+
+    ALPHAPOSE = "alphapose"
+    MOVENET = "movenet"
+    BOTH = "both"
+
+
+Data = Annotated[
+    Path | None, typer.Option("--data", envvar="SUREFOOT_DATA", help="Folder of the research data.", show_default=False)
+]
+Quick = Annotated[bool, typer.Option("--quick", help="A few small fits, to see that everything runs.")]
+Epochs = Annotated[int | None, typer.Option(min=1, max=300, help="Epochs of the shipped classifier.")]
+Folds = Annotated[int, typer.Option(min=2, max=24, help="Folds, divided by recording.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of folds, draws and weights.")]
+
+
+def train(
+    data: Data = None,
+    out: Annotated[Path, typer.Option(help="Checkpoint to write (.safetensors).")] = Path("surefoot.safetensors"),
+    seed: Seed = 0,
+    forecaster: Annotated[Forecaster, typer.Option(help="Network that foresees the motion.")] = Forecaster.DCT_MLP,
+    epochs: Epochs = None,
+    folds: Folds = 5,
+    evaluated: Annotated[
+        Path | None,
+        typer.Option("--evaluation", help="JSON of `surefoot evaluate`: calibration and metrics for the checkpoint."),
+    ] = None,
+    quick: Quick = False,
+) -> None:
+    """Fit the networks to every recording and write a checkpoint."""
+    folder = data_folder(data)
+    measured = None if evaluated is None else production.read_evaluation(evaluated)
+    plan = plan_for(forecaster.value, seed, quick, epochs)
+    _one_thread()
+    corpus = read_corpus(folder, plan.mocap_clips, seed, CleaningConfig())
+    with progress_bars() as progress:
+        made = production.make_checkpoint(corpus, plan, folds, seed, measured, progress)
+    _writable(out)
+    checkpoint.save(made, out)
+    Console().print(f"wrote {out} ({out.stat().st_size / 1e6:.1f} MB)")
+
+
+def evaluate(
+    data: Data = None,
+    protocol: Annotated[Protocol, typer.Option(help="'grouped' by recording, or the 'paper''s.")] = Protocol.GROUPED,
+    folds: Folds = 5,
+    seed: Seed = 0,
+    forecaster: Annotated[Forecaster, typer.Option(help="Network that foresees the motion.")] = Forecaster.DCT_MLP,
+    keypoints: Annotated[Keypoints, typer.Option(help="Tracks of the falls to test on.")] = Keypoints.ALPHAPOSE,
+    epochs: Epochs = None,
+    json_file: Annotated[Path | None, typer.Option("--json", help="Write every number to this file.")] = None,
+    quick: Quick = False,
+) -> None:
+    """Print how well recordings are foreseen that no network has seen, beside simpler ways."""
+    folder = data_folder(data)
+    plan = plan_for(forecaster.value, seed, quick, epochs)
+    _one_thread()
+    corpus = read_corpus(folder, plan.mocap_clips, seed, CleaningConfig())
+    with progress_bars() as progress:
+        if protocol is Protocol.GROUPED:
+            title = f"{folds} folds by recording, seed {seed}, URFD falls ({keypoints.value})"
+            outcome = evaluation.grouped(corpus, plan, folds, seed, keypoints.value, progress)
+        else:
+            title = (
+                f"random 80/20 of overlapping windows, seed {seed}, URFD falls ({keypoints.value}): not by recording"
+            )
+            outcome = evaluation.paper(corpus, plan, seed, keypoints.value, progress)
+    report.show(outcome, title, _console())
+    if json_file is not None:
+        _writable(json_file)
+        json_file.write_text(json.dumps(report.as_json(outcome, title, seed), indent=1) + "\n")
+
+
+def _console() -> Console:
+    """A terminal as it is; a file or a pipe wide enough for the tables."""
+    console = Console()
+    return console if console.is_terminal else Console(width=110)
+
+
+def _one_thread() -> None:
+    """More threads give other sums, and on a busy machine no speed."""
+    torch.set_num_threads(1)
+
+
+def _writable(path: Path) -> None:
+    """Make the folder of an output file.
+
+    Raises:
+        SurefootError: it cannot be made, or the path is a folder.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SurefootError(f"cannot write '{path}': {error.strerror}") from error
+    if path.is_dir():
+        raise SurefootError(f"cannot write '{path}': it is a folder")
