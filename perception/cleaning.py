@@ -68,6 +68,7 @@ class Cleaner:
         self._lines = _Lines(config)
         self._grid = _Grid(nanoseconds(config.snap_s))
         self._filter = _Butterworth(config.cutoff_hz)
+        self._origin_ns = 0
         self._newest_ns: int | None = None
 
     def push(self, keypoints: Floats, stamp_ns: int) -> list[CleanFrame]:
@@ -84,16 +85,19 @@ class Cleaner:
         """
         if keypoints.shape != (KEYPOINTS, 3):
             raise ValueError(f"keypoints have shape {keypoints.shape}, expected ({KEYPOINTS}, 3)")
-        if self._newest_ns is not None:
+        if self._newest_ns is None:
+            self._origin_ns = stamp_ns
+        else:
             step_ns = stamp_ns - self._newest_ns
             if step_ns <= 0:
                 return []
             if step_ns > self._config.fill_s * NS:
                 self._restart()
         self._newest_ns = stamp_ns
-        points = self._lines.push(np.asarray(keypoints, dtype=np.float64), stamp_ns, self._scale.length_px)
+        now_s = (stamp_ns - self._origin_ns) / NS
+        points = self._lines.push(np.asarray(keypoints, dtype=np.float64), stamp_ns, now_s, self._scale.length_px)
         measured = np.where((points.status == KeypointStatus.MEASURED)[:, None], points.position_px, np.nan)
-        body_length = self._scale.update(measured, stamp_ns / NS)
+        body_length = self._scale.update(measured, now_s)
         return [
             CleanFrame(
                 tick.stamp_ns,
@@ -153,15 +157,11 @@ class _Lines:
         self._last_s = np.full(KEYPOINTS, -np.inf)  # and its time [s]
         self._velocity = np.zeros((KEYPOINTS, 2))  # slope of the line through the last two accepted [px/s]
         self._rejected = np.full((KEYPOINTS, 2), np.nan)  # last detection out of reach since then [px]
-        self._origin_ns: int | None = None
 
-    def push(self, keypoints: Floats, stamp_ns: int, body_length_px: float) -> _Points:
-        if self._origin_ns is None:
-            self._origin_ns = stamp_ns
-        now_s = (stamp_ns - self._origin_ns) / NS
+    def push(self, keypoints: Floats, stamp_ns: int, now_s: float, body_length_px: float) -> _Points:
         position = keypoints[:, :2]
         confidence = keypoints[:, 2]
-        detected = (confidence >= self._config.min_confidence) & np.isfinite(position).all(axis=1)
+        detected = (confidence >= self._config.min_confidence) & np.isfinite(keypoints).all(axis=1)
 
         elapsed_s = now_s - self._last_s
         alive = elapsed_s <= self._config.fill_s

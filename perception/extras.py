@@ -20,8 +20,9 @@ def load_extra(module: str, what: str, package: str, extra: str) -> Any:
         raise MissingExtraError(what, package, extra) from error
 
 
-def load_opencv(what: str) -> Any:
-    """Return `cv2`, on one thread, so that it does not compete with the networks for cores."""
-    cv2 = load_extra("cv2", what, "opencv-python-headless", "video")
+def load_opencv(what: str, extra: str) -> Any:
+    """Return `cv2`: silent, because what goes wrong is raised; on one thread, because the networks want the cores."""
+    cv2 = load_extra("cv2", what, "opencv-python-headless", extra)
     cv2.setNumThreads(1)
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     return cv2

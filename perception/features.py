@@ -29,6 +29,7 @@ LEG_PER_TRUNK: Final = (0.530 - 0.039) / (0.818 - 0.530)
 
 _LEGS: Final = ((L_HIP, L_KNEE, L_ANKLE), (R_HIP, R_KNEE, R_ANKLE))
 _STRETCHED: Final = 0.85  # share of the body length that is vertical in one who stands
+_SHORTEST_LEG: Final = 1.1  # leg over trunk of one who does not sit facing the camera
 _BROADEST: Final = 0.9  # shoulder width over trunk length of one who is not foreshortened (Winter: 0.259 / 0.288)
 _MEDIAN_OF: Final = 5  # measurements; two wrong ones in a row change nothing
 _LONGEST_STEP_S: Final = 0.1  # a gap between frames is no evidence that the person shrank
@@ -177,7 +178,8 @@ def _measure(position_px: Floats) -> tuple[float, _Posture]:
     if not trunk_down > abs(hip_x - shoulder_x):
         return length, _Posture.OTHER
     width = math.dist(points[L_SHOULDER], points[R_SHOULDER])
-    if trunk_down + leg_down > _STRETCHED * length and width < _BROADEST * trunk:
+    stretched = trunk_down + leg_down > _STRETCHED * length
+    if stretched and leg > _SHORTEST_LEG * trunk and width < _BROADEST * trunk:
         return length, _Posture.STANDING
     return length, _Posture.UPRIGHT
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from bridge.clock import NS, Clock, nanoseconds
 from bridge.config.perception import PerceptionConfig
-from bridge.errors import SourceError
+from bridge.errors import SurefootError
 from bridge.messages import Floats, Keypoints, KeypointStatus, NodeStatus
 from bridge.node import NodeContext, main
 from bridge.outbox import Outbox
@@ -172,7 +172,7 @@ def create(context: NodeContext) -> PerceptionNode:
     source = open_source(uri, source_config, context.clock)
     try:
         estimator = load_estimator(name, config) if source.gives_images else None
-    except SourceError:
+    except SurefootError:
         source.close()
         raise
     return PerceptionNode(source, estimator, config, Outbox(context.transport, KEYPOINTS), context.clock, context.log)

@@ -62,7 +62,7 @@ class SourceConfig(Section):
     crop_px: tuple[int, int, int, int] | None = None
     """Part of each image that is used: x, y, width, height; not set = the whole image."""
     paced: bool = True
-    """Files are played in real time; false: as fast as they can be processed."""
+    """Files are played in real time; false: as fast as they can be processed, which no reader on the wire accepts."""
     fps_hz: float = Field(default=30.0, ge=1, le=240)
     """Frame rate of files that carry none: bare keypoint arrays and folders of images."""
     image_width_px: int = Field(default=320, ge=16, le=16384)
@@ -78,7 +78,7 @@ class MovenetConfig(Section):
     """Path of the `.tflite` file, relative to the working directory; "" = not set."""
     crop_min_score: float = Field(default=0.2, ge=0, le=1)
     """Keypoints with less score than this do not place the crop of the next frame."""
-    min_score: float = Field(default=0.15, ge=0, le=1)
+    min_score: float = Field(default=0.1, ge=0, le=1)
     """Mean score of the twelve keypoints below which nobody is in the picture."""
 
 

@@ -16,7 +16,7 @@ from bridge.config.perception import MovenetConfig
 from bridge.errors import SourceError
 from bridge.messages import Floats
 from perception.estimators.crop import around, cut, whole
-from perception.extras import load_extra
+from perception.extras import load_extra, load_opencv
 from perception.skeleton import COCO_INDEX
 from perception.sources.frame import Image
 
@@ -34,7 +34,7 @@ def load_movenet(config: MovenetConfig) -> Movenet:
     if not config.weights:
         raise SourceError("perception.movenet.weights is not set: path of the MoveNet SinglePose .tflite file")
     litert = load_extra("ai_edge_litert.interpreter", "MoveNet", "ai-edge-litert", "movenet")
-    cv2 = load_extra("cv2", "MoveNet", "opencv-python-headless", "movenet")
+    cv2 = load_opencv("MoveNet", "movenet")
     if not Path(config.weights).is_file():
         raise SourceError(f"perception.movenet.weights: {config.weights}: no such file")
     try:

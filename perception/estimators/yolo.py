@@ -17,7 +17,7 @@ from bridge.config.perception import YoloConfig
 from bridge.errors import SourceError
 from bridge.messages import Floats
 from perception.estimators.letterbox import letterbox
-from perception.extras import load_extra
+from perception.extras import load_extra, load_opencv
 from perception.skeleton import COCO_INDEX
 from perception.sources.frame import Image
 
@@ -36,7 +36,7 @@ def load_yolo(config: YoloConfig) -> Yolo:
     if not config.model:
         raise SourceError("perception.yolo.model is not set: path of a YOLOv8-Pose .onnx file")
     onnxruntime = load_extra("onnxruntime", "YOLOv8-Pose", "onnxruntime", "yolo")
-    cv2 = load_extra("cv2", "YOLOv8-Pose", "opencv-python-headless", "yolo")
+    cv2 = load_opencv("YOLOv8-Pose", "yolo")
     if not Path(config.model).is_file():
         raise SourceError(f"perception.yolo.model: {config.model}: no such file")
     options = onnxruntime.SessionOptions()

@@ -140,8 +140,7 @@ def open_camera(address: int | str, crop: Crop | None, clock: Clock) -> Camera:
         SourceError: it does not open or gives no frame.
         MissingExtraError: OpenCV is not installed.
     """
-    cv2 = load_opencv("reading a camera")
-    cv2.setLogLevel(0)
+    cv2 = load_opencv("reading a camera", "video")
 
     def open_capture() -> Capture:
         capture: Capture = cv2.VideoCapture(address)

@@ -26,8 +26,7 @@ def open_folder(folder: Path, crop: Crop | None, fps_hz: float) -> Iterator[Stil
     paths = sorted((path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES), key=_order)
     if not paths:
         raise SourceError(f"{folder}: no image in this folder ({', '.join(sorted(_SUFFIXES))})")
-    cv2 = load_opencv("reading images")
-    cv2.setLogLevel(0)
+    cv2 = load_opencv("reading images", "video")
     return _stills(cv2, paths, crop, fps_hz)
 
 

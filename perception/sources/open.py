@@ -26,7 +26,7 @@ def open_source(spec: str, config: SourceConfig, clock: Clock) -> Source:
     """Open the source that `spec` names.
 
     Args:
-        spec: `FILE.npz:CLIP[/ARRAY]`, a video file, a folder of images, `camera:N`, or a URL (http, rtsp, rtmp, udp, tcp).
+        spec: `FILE.npz:CLIP[/ARRAY]`, a video file, a folder of images, `camera:N`, or a URL.
         config: crop, pacing, and what files may lack.
         clock: stamps the frames of cameras.
 
