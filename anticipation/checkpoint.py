@@ -25,7 +25,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save as to_bytes
 from torch import Tensor, nn
 
-from anticipation.gait_state import CLASSIFIERS
+from anticipation.gait_state import CLASSIFIERS, DirectedGraphNetwork
 from anticipation.motion import BASELINES, FORECASTERS, HORIZON, WINDOW, Forecast
 from anticipation.quality import PoseStatistics
 from anticipation.transient import TransientPlane
@@ -54,7 +54,7 @@ class Checkpoint:
     """The networks with the arrays that belong to them."""
 
     forecaster: nn.Module | str  # a module registered in FORECASTERS, or a name from BASELINES
-    classifier: nn.Module  # registered in CLASSIFIERS
+    classifier: DirectedGraphNetwork  # registered in CLASSIFIERS
     plane: TransientPlane
     statistics: PoseStatistics
     temperature: Floats  # (16,) logits of step k are divided by temperature[k]

@@ -201,5 +201,5 @@ class DirectedGraphNetwork(nn.Module):
         return logits
 
 
-CLASSIFIERS: Final[Mapping[str, Callable[..., nn.Module]]] = {"dgnn": DirectedGraphNetwork}
+CLASSIFIERS: Final[Mapping[str, Callable[..., DirectedGraphNetwork]]] = {"dgnn": DirectedGraphNetwork}
 """Classifiers by the name a checkpoint carries; the constructor takes the module's `settings`."""

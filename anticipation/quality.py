@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Self
+from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,8 +109,31 @@ def measured_share(status: NDArray[np.uint8]) -> float:
     return float(_WEIGHT[status].mean())
 
 
-def quality(config: QualityConfig, status: NDArray[Any], strangeness: Floats, people: int) -> float:
-    """Quality 0..1 of a window.
+class Quality(NamedTuple):
+    """The three factors, each 0..1."""
+
+    seen: float  # keypoints were measured
+    known: float  # poses are like those in training
+    alone: float  # one person in view
+
+    @property
+    def total(self) -> float:
+        """Their product."""
+        return self.seen * self.known * self.alone
+
+    @property
+    def cause(self) -> str:
+        """What lowers the quality most, in words."""
+        causes = (
+            (self.seen, "too few keypoints were measured"),
+            (self.known, "the poses are unlike any seen in training"),
+            (self.alone, "several people are in view"),
+        )
+        return min(causes)[1]
+
+
+def judge(config: QualityConfig, status: NDArray[Any], strangeness: Floats, people: int) -> Quality:
+    """Judge a window.
 
     Args:
         config: where each factor begins to fall and where it reaches 0.
@@ -118,10 +141,11 @@ def quality(config: QualityConfig, status: NDArray[Any], strangeness: Floats, pe
         strangeness: (15,) from `PoseStatistics.strangeness`.
         people: how many people the detector saw in the newest frame.
     """
-    seen = _ramp(measured_share(status), config.measured_share_zero, config.measured_share_full)
-    known = _ramp(float(strangeness.mean()), config.strangeness_zero, config.strangeness_full)
-    alone = 1.0 if people <= 1 else config.several_people
-    return seen * known * alone
+    return Quality(
+        seen=_ramp(measured_share(status), config.measured_share_zero, config.measured_share_full),
+        known=_ramp(float(strangeness.mean()), config.strangeness_zero, config.strangeness_full),
+        alone=1.0 if people <= 1 else config.several_people,
+    )
 
 
 def _ramp(value: float, zero: float, full: float) -> float:

@@ -80,7 +80,8 @@ class TransientPlane:
         X = np.asarray(features, dtype=np.float64)
         mean, scale = X.mean(axis=0), X.std(axis=0)
         scale = np.where(scale > 1e-9, scale, 1.0)
-        axes = PCA(n_components=2, svd_solver="covariance_eigh").fit((X - mean) / scale).components_.T / scale[:, None]  # (D, 2)
+        pca = PCA(n_components=2, svd_solver="covariance_eigh").fit((X - mean) / scale)
+        axes = pca.components_.T / scale[:, None]  # (D, 2)
         points = (X - mean) @ axes
         spread = np.mean([np.cov(points[labels == k], rowvar=False) for k in range(3)], axis=0)
         variances, directions = np.linalg.eigh(spread)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bridge.config.admittance import AdmittanceConfig
+from bridge.config.anticipation import AnticipationConfig
 from bridge.config.bridge import BridgeConfig
 from bridge.config.controller import ControllerConfig
 from bridge.config.drive import DriveConfig
@@ -10,6 +11,7 @@ from bridge.config.gate import GateConfig
 from bridge.config.intervention import InterventionConfig
 from bridge.config.launch import LaunchConfig
 from bridge.config.mpc import MpcConfig
+from bridge.config.perception import PerceptionConfig
 from bridge.config.section import Section
 from bridge.config.supervisor import SupervisorConfig
 from bridge.config.walker import WalkerConfig
@@ -23,6 +25,12 @@ class SurefootConfig(Section):
 
     launch: LaunchConfig = LaunchConfig()
     """The processes."""
+
+    perception: PerceptionConfig = PerceptionConfig()
+    """Camera, video or recording in, twelve clean keypoints out."""
+
+    anticipation: AnticipationConfig = AnticipationConfig()
+    """From a window of keypoints to the fall-state horizon."""
 
     intervention: InterventionConfig = InterventionConfig()
     """From the fall-state horizon to risk and stiffening; reloaded while running."""

@@ -1,0 +1,186 @@
+"""The networks as a running node uses them: one window at a time, the same numbers with less work.
+
+At batch size one the arithmetic is small and the calls are many, so here batch norms are folded into the
+layers before them, vertices and edges share one batched product, and the recurrent layer is a plain
+matrix-vector product per step. Tests hold each class equal to the module it was made from. The classes keep
+copies: later changes of a module do not reach them.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, cast
+
+import torch
+from torch import Tensor, nn
+
+from anticipation.gait_state import ChannelNorm, DirectedGraphBlock, DirectedGraphNetwork, Stream, incidence
+from anticipation.motion import COORDINATES, HORIZON, Forecast, LstmForecaster
+
+
+class Judgement(NamedTuple):
+    """The classifier's view of every window of a sequence of T frames."""
+
+    embedding: Tensor  # (T - 14, 128)
+    logits: Tensor  # (T - 14, 3)
+
+
+def fast_forecast(forecaster: Forecast) -> Forecast:
+    """Return a quicker equal of `forecaster` for windows (1, 15, 12, 2), or itself if there is none."""
+    return FastLstm(forecaster) if isinstance(forecaster, LstmForecaster) else forecaster
+
+
+class FastDirectedGraph:
+    """`DirectedGraphNetwork` in evaluation mode for one sequence: (1, T, 12, C) -> `Judgement`.
+
+    Vertices and edges, twelve of each, are the two entries of the first axis of X (2, 12, T, C).
+    """
+
+    def __init__(self, network: DirectedGraphNetwork) -> None:
+        with torch.no_grad():
+            source, target = incidence(torch.stack((network.source, network.target), dim=1).numpy())
+            self._bones = (target - source).T.contiguous()  # (E, V)
+            norms = [_affine(norm) for norm in (network.vertex_norm, network.edge_norm)]
+            self._scale = torch.stack([scale for scale, _ in norms])[:, None, None]  # (2, 1, 1, C)
+            self._shift = torch.stack([shift for _, shift in norms])[:, None, None]
+            self._blocks = [_FastBlock(cast(DirectedGraphBlock, block)) for block in network.blocks]
+            self._head = network.head.weight.T.clone()
+            self._bias = network.head.bias.clone()
+
+    def __call__(self, frames: Tensor) -> Judgement:
+        """Judge every window of frames (1, T, 12, C)."""
+        vertices = frames[0].transpose(0, 1).contiguous()  # (12, T, C)
+        edges = (self._bones @ vertices.flatten(1)).view_as(vertices)
+        X = torch.addcmul(self._shift, torch.stack((vertices, edges)), self._scale)
+        for block in self._blocks:
+            X = block(X)
+        embedding = X.mean(dim=1).transpose(0, 1).flatten(1)  # (T - 14, 2 x 64)
+        return Judgement(embedding, torch.addmm(self._bias, embedding, self._head))
+
+
+class _FastBlock:
+    """`DirectedGraphBlock` for X (2, 12, T, C_in) -> (2, 12, T - kernel + 1, C_out)."""
+
+    def __init__(self, block: DirectedGraphBlock) -> None:
+        source, target = block.graph.matrices()
+        self._at_vertices = torch.cat((target / block.graph.target_count, source / block.graph.source_count))  # (24, E)
+        self._at_edges = torch.cat((source.T, target.T))  # (24, V)
+        self._vertex, self._vertex_bias = _update(block.vertex)
+        self._edge, self._edge_bias = _update(block.edge)
+        streams = [_convolution(stream) for stream in (block.vertex, block.edge)]
+        self._time = torch.stack([weight for weight, _ in streams])  # (2, kernel C_out + C_in, C_out)
+        self._time_bias = torch.stack([bias for _, bias in streams])[:, None]  # (2, 1, C_out)
+        self._kernel = block.vertex.kernel
+        self._width = block.vertex.update.out_features
+
+    def __call__(self, X: Tensor) -> Tensor:
+        vertices, edges = X.unbind()
+        _, nodes, T, _ = X.shape
+        Y = X.new_empty(2, nodes, T, self._width)
+        self._mix(self._at_vertices, edges, vertices, self._vertex, self._vertex_bias, Y[0])
+        self._mix(self._at_edges, Y[0], edges, self._edge, self._edge_bias, Y[1])
+        # kernel successive frames of C channels lie one behind the other in memory: windows are a view
+        steps, reach = T - self._kernel + 1, self._kernel * self._width
+        windows = Y.as_strided((2, nodes, steps, reach), (*Y.stride()[:3], 1))
+        columns = torch.cat((windows, X[:, :, self._kernel - 1 :]), dim=-1).flatten(1, 2)
+        Z = torch.baddbmm(self._time_bias, columns, self._time).relu_()
+        return Z.view(2, nodes, steps, self._width)
+
+    @staticmethod
+    def _mix(graph: Tensor, neighbours: Tensor, own: Tensor, weight: Tensor, bias: Tensor, out: Tensor) -> None:
+        """One layer on [own, first neighbours, second neighbours], written to `out` (12, T, C_out)."""
+        first, second = (graph @ neighbours.flatten(1)).view(2, *neighbours.shape).unbind()
+        entered = torch.cat((own, first, second), dim=-1).flatten(0, 1)
+        torch.addmm(bias, entered, weight, out=out.view(-1, out.shape[-1])).relu_()
+
+
+class FastLstm:
+    """`LstmForecaster` in evaluation mode for one window: (1, 15, 12, 2) -> (1, 15, 12, 2).
+
+    Matrix-vector products instead of the general recurrent kernels, whose set-up costs more than a step;
+    a layer's input products are taken for the whole window at once.
+    """
+
+    def __init__(self, network: LstmForecaster) -> None:
+        hidden = network.lstm.hidden_size
+        # torch orders the gates input, forget, cell, output; with the cell last, one sigmoid serves the other three
+        order = torch.cat([torch.arange(hidden) + k * hidden for k in (0, 1, 3, 2)])
+        with torch.no_grad():
+            self._layers = [
+                _Layer(
+                    getattr(network.lstm, f"weight_ih_l{k}")[order],
+                    getattr(network.lstm, f"weight_hh_l{k}")[order],
+                    (getattr(network.lstm, f"bias_ih_l{k}") + getattr(network.lstm, f"bias_hh_l{k}"))[order],
+                )
+                for k in range(network.lstm.num_layers)
+            ]
+            self._head = network.head.weight.clone()
+            self._bias = network.head.bias.clone()
+        self._hidden = hidden
+        self._rollout = network.mode == "rollout"
+        self._residual = network.residual
+
+    def __call__(self, window: Tensor) -> Tensor:
+        """Forecast (1, 15, 12, 2) from a window (1, 15, 12, 2)."""
+        poses = window.reshape(-1, COORDINATES)  # (15, 24)
+        state = [(window.new_zeros(self._hidden), window.new_zeros(self._hidden)) for _ in self._layers]
+        hidden = self._advance(poses, state)
+        last = poses[-1]
+        if not self._rollout:
+            future = torch.addmv(self._bias, self._head, hidden).view(HORIZON, COORDINATES)
+            return (future + last if self._residual else future).view(window.shape)
+        futures = []
+        for step in range(HORIZON):
+            if step:
+                hidden = self._advance(last[None], state)
+            pose = torch.addmv(self._bias, self._head, hidden)
+            last = last + pose if self._residual else pose
+            futures.append(last)
+        return torch.stack(futures).view(window.shape)
+
+    def _advance(self, inputs: Tensor, state: list[tuple[Tensor, Tensor]]) -> Tensor:
+        """Feed inputs (S, 24), update `state` in place and return the last layer's newest hidden vector."""
+        for k, layer in enumerate(self._layers):
+            entering = torch.addmm(layer.bias, inputs, layer.weight_input.T)  # (S, 4 hidden)
+            hidden, cell = state[k]
+            outputs = []
+            for gates in entering:
+                gates = torch.addmv(gates, layer.weight_hidden, hidden)  # noqa: PLW2901 (the same gates, complete)
+                enter, forget, leave = gates[: 3 * self._hidden].sigmoid_().view(3, self._hidden)
+                cell = torch.addcmul(forget * cell, enter, gates[3 * self._hidden :].tanh_())
+                hidden = leave * cell.tanh()
+                outputs.append(hidden)
+            state[k] = (hidden, cell)
+            inputs = torch.stack(outputs)
+        return inputs[-1]
+
+
+class _Layer(NamedTuple):
+    """One recurrent layer, gates in the order input, forget, output, cell."""
+
+    weight_input: Tensor  # (4 hidden, entering)
+    weight_hidden: Tensor  # (4 hidden, hidden)
+    bias: Tensor  # (4 hidden,)
+
+
+def _affine(norm: ChannelNorm) -> tuple[Tensor, Tensor]:
+    """Batch norm in evaluation mode as x * scale + shift, each (C,)."""
+    statistics = norm.norm
+    assert statistics.running_mean is not None and statistics.running_var is not None  # noqa: PT018
+    scale = statistics.weight / torch.sqrt(statistics.running_var + statistics.eps)
+    return scale, statistics.bias - statistics.running_mean * scale
+
+
+def _update(stream: Stream) -> tuple[Tensor, Tensor]:
+    """Update layer and its norm as one weight (entering, C_out) and bias (C_out,)."""
+    scale, shift = _affine(stream.update_norm)
+    return (stream.update.weight * scale[:, None]).T.contiguous(), shift
+
+
+def _convolution(stream: Stream) -> tuple[Tensor, Tensor]:
+    """Convolution, its norm and the shortcut as one weight (kernel C_out + C_in, C_out) and bias (C_out,)."""
+    scale, shift = _affine(stream.time_norm)
+    kernel = stream.time.convolution.weight[..., 0] * scale[:, None, None]  # (C_out, C, kernel)
+    weight = kernel.permute(2, 1, 0).flatten(0, 1)  # rows: frame by frame, channel by channel
+    if isinstance(stream.shortcut, nn.Linear):
+        return torch.cat((weight, stream.shortcut.weight.T)), shift + stream.shortcut.bias
+    return torch.cat((weight, torch.eye(len(scale)))), shift

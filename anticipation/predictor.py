@@ -1,0 +1,156 @@
+"""Keypoints in, fall-state horizon out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final, Self
+
+import numpy as np
+import torch
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from anticipation.checkpoint import Checkpoint, load
+from anticipation.inference import FastDirectedGraph, fast_forecast
+from anticipation.motion import BASELINES, COORDINATES, HORIZON, WINDOW
+from anticipation.quality import Quality, judge
+from anticipation.window import PoseWindow
+from bridge.config.anticipation import AnticipationConfig
+from bridge.messages import CLASSES, KEYPOINTS, STEP_S, STEPS, FallHorizon, Floats, Keypoints
+
+_STABLE: Final = CLASSES.index("stable")
+_TRANSIENT: Final = CLASSES.index("transient")
+
+
+class Predictor:
+    """Keeps a person's last half second and foresees the next.
+
+    One window is forecast, and one pass of the classifier over the 15 frames seen and the 15 foreseen judges
+    the sixteen windows that end at steps 0..15.
+    """
+
+    def __init__(self, checkpoint: Checkpoint, config: AnticipationConfig) -> None:
+        self._config = config
+        self._plane = checkpoint.plane
+        self._statistics = checkpoint.statistics
+        self._temperature = checkpoint.temperature[:, None]
+        own = config.forecaster == "checkpoint"
+        self._forecast = fast_forecast(checkpoint.forecast if own else BASELINES[config.forecaster])
+        self._classify = FastDirectedGraph(checkpoint.classifier)
+        self._window = PoseWindow(config, checkpoint.statistics.mean_pose)
+        self._frames = torch.zeros(1, WINDOW + HORIZON, KEYPOINTS, 2)
+        self._ahead = np.arange(STEPS)[:, None]
+
+    @classmethod
+    def from_config(cls, config: AnticipationConfig) -> Self:
+        """Load the checkpoint that `config` names.
+
+        Raises:
+            CheckpointError: it is missing or damaged.
+        """
+        return cls(load(Path(config.checkpoint) if config.checkpoint else None), config)
+
+    @property
+    def frames(self) -> int:
+        """How many of the fifteen ticks of the window are there."""
+        return self._window.frames
+
+    def reset(self) -> None:
+        """Forget the person."""
+        self._window.reset()
+
+    def warm_up(self) -> None:
+        """Run the networks a few times, so that the first real step is as quick as the later ones."""
+        for _ in range(5):
+            self._run(np.repeat(self._statistics.mean_pose[None], WINDOW, axis=0).astype(np.float32))
+
+    def push(self, keypoints: Keypoints) -> None:
+        """Take in the next tick; one that is not newer than the last is ignored."""
+        self._window.push(keypoints)
+
+    def predict(self) -> FallHorizon | None:
+        """Return the horizon that starts at the newest tick; None before the first full window.
+
+        A horizon that must not be used says why: `valid` is False and `reason` names what is
+        wrong with the newest keypoints or with the window.
+        """
+        window = self._window
+        if window.refusal:
+            return invalid_horizon(window.stamp_ns, window.refusal)
+        if not window.full:
+            return None
+        strangeness = self._statistics.strangeness(window.relative)
+        quality = judge(self._config.quality, window.status, strangeness, window.people)
+        if quality.total < self._config.min_quality:
+            reason = f"quality is {quality.total:.2f}, limit {self._config.min_quality:.2f}: {quality.cause}"
+            return invalid_horizon(window.stamp_ns, reason, quality.total)
+        frames, logits, features = self._run(window.relative)
+        transition = self._plane.transition(features)
+        return FallHorizon(
+            stamp_ns=window.stamp_ns,
+            probabilities=self._probabilities(logits, quality),
+            distance=transition.distance,
+            distance_rate=transition.distance_rate,
+            time_to_boundary=transition.time_to_boundary,
+            centre_distance=transition.centre_distance,
+            plane=transition.plane,
+            forecast_px=self._in_image(frames[WINDOW - 1 :]),
+            quality=quality.total,
+        )
+
+    def _run(self, window: NDArray[np.float32]) -> tuple[Floats, Floats, Floats]:
+        """Return 30 relative poses (30, 12, 2), logits (16, 3) and the plane's features (16, D) of a window."""
+        with torch.inference_mode():
+            self._frames[0, :WINDOW] = torch.from_numpy(window)
+            self._frames[:, WINDOW:] = self._forecast(self._frames[:, :WINDOW])
+            judgement = self._classify(self._frames)
+        frames = self._frames[0].numpy().astype(np.float64)
+        if self._plane.features == "embedding":
+            features = judgement.embedding.numpy().astype(np.float64)
+        else:  # every window is a stretch of the flattened frames
+            features = sliding_window_view(frames.reshape(-1), WINDOW * COORDINATES)[::COORDINATES]
+        return frames, judgement.logits.numpy().astype(np.float64), features
+
+    def _probabilities(self, logits: Floats, quality: Quality) -> Floats:
+        """Calibrated probabilities (16, 3).
+
+        Where the quality is below one half, 'stable' gets no more than twice the quality and 'transient' gets
+        the rest: input that was never seen is not sold as stable.
+        """
+        scaled = logits / self._temperature
+        likelihood = np.exp(scaled - scaled.max(axis=1, keepdims=True))
+        probabilities: Floats = likelihood / likelihood.sum(axis=1, keepdims=True)
+        excess = np.maximum(probabilities[:, _STABLE] - 2.0 * quality.total, 0.0)
+        probabilities[:, _STABLE] -= excess
+        probabilities[:, _TRANSIENT] += excess
+        return probabilities
+
+    def _in_image(self, poses: Floats) -> Floats:
+        """Relative poses (16, 12, 2) of steps 0..15 in the image [px].
+
+        The body's centre goes on at the velocity of its last three ticks, as far as people can be that fast.
+        """
+        centre_px, length_px = self._window.centre_px, self._window.body_length_px
+        velocity = (centre_px[-1] - centre_px[-3]) / 2.0  # [px/tick]
+        fastest = self._config.max_centre_speed_body_lengths_s * length_px * STEP_S
+        velocity *= min(1.0, fastest / max(float(np.hypot(*velocity)), 1e-9))
+        centres = centre_px[-1] + self._ahead * velocity  # (16, 2)
+        foreseen_px: Floats = poses * length_px + centres[:, None]
+        return foreseen_px
+
+
+def invalid_horizon(stamp_ns: int, reason: str, quality: float = 0.0) -> FallHorizon:
+    """Return a horizon that says why there is none; its numbers are NaN."""
+    return FallHorizon(
+        stamp_ns=stamp_ns,
+        probabilities=np.full((STEPS, len(CLASSES)), np.nan),
+        distance=np.full(STEPS, np.nan),
+        distance_rate=np.full(STEPS, np.nan),
+        time_to_boundary=np.full(STEPS, np.nan),
+        centre_distance=np.full((STEPS, len(CLASSES)), np.nan),
+        plane=np.full((STEPS, 2), np.nan),
+        forecast_px=np.full((STEPS, KEYPOINTS, 2), np.nan),
+        quality=quality,
+        valid=False,
+        reason=reason,
+    )
