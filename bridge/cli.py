@@ -34,7 +34,7 @@ COMMANDS: Final = {
     "up": Command("bridge.launch.command:up", "Run the processes and watch over them."),
     "config": Command("bridge.config.command:config", "Print a configuration file with every key and its meaning."),
     "demo": Command("bridge.launch.demo:demo", "Run it all on a generated stumble; print a timeline, draw a picture."),
-    "assess": Command("bridge.assess.command:assess", "Assess keypoint clips offline, through the code that runs live."),
+    "assess": Command("bridge.assess.command:assess", "Assess keypoint clips offline with the code that runs live."),
     "train": Command("anticipation.training.commands:train", "Train the anticipation networks."),
     "evaluate": Command("anticipation.training.commands:evaluate", "Measure the anticipation, split by sequence."),
 }

@@ -108,7 +108,8 @@ class Inbox(Generic[M]):
 
     def _judge(self, sample: Sample, now_ns: int) -> M:
         message: Any = decode(self.topic, sample.payload, max(sample.sequence, 0))
-        ahead_s = (message.stamp_ns - now_ns) / NS
+        # a sample may arrive between the reader's `now` and this line, however late the reader got here
+        ahead_s = (message.stamp_ns - max(now_ns, sample.arrival_ns)) / NS
         if ahead_s > FUTURE_TOLERANCE_S:
             limit_ms = FUTURE_TOLERANCE_S * 1e3
             raise InvalidMessage(f"{self.topic.key} is stamped {ahead_s * 1e3:.0f} ms ahead, limit {limit_ms:.0f}")

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from bridge.clock import NS, Clock
 from bridge.inbox import Inbox, Reading
-from bridge.messages import FallHorizon, GaitState, NodeStatus, SupportCommand
+from bridge.messages import FallHorizon, NodeStatus, SupportCommand
 from bridge.topics import DIAGNOSTICS, FALL_HORIZON, SUPPORT_COMMAND
 from bridge.transport.interface import Transport
 
@@ -36,9 +36,8 @@ class Monitor:
         self._alive: dict[str, bool] = {}
         self._statuses: dict[str, NodeStatus] = {}
         self._diagnostics: Inbox[NodeStatus] = Inbox(transport, DIAGNOSTICS, depth=64)
-        self._command: Inbox[SupportCommand] = Inbox(transport, SUPPORT_COMMAND, depth=256)
-        self._horizon: Inbox[FallHorizon] = Inbox(transport, FALL_HORIZON, depth=64)
-        self._safe_since_ns = 0
+        self._command: Inbox[SupportCommand] = Inbox(transport, SUPPORT_COMMAND)
+        self._horizon: Inbox[FallHorizon] = Inbox(transport, FALL_HORIZON)
         transport.watch_alive(self._alive.__setitem__)
 
     def look(self) -> View:
@@ -46,21 +45,12 @@ class Monitor:
         now_ns = self._clock.now_ns()
         for status in self._diagnostics.drain(now_ns):
             self._statuses[status.role] = status
-        for command in self._command.drain(now_ns):
-            if command.state is not GaitState.SAFE_STOP:
-                self._safe_since_ns = 0
-            elif not self._safe_since_ns:
-                self._safe_since_ns = command.stamp_ns
         names = sorted(self._alive.keys() | self._statuses.keys())
         return View(
             {name: self._role(name, now_ns) for name in names},
             self._command.read(now_ns),
             self._horizon.read(now_ns),
         )
-
-    def stopped_safely(self) -> bool:
-        """Whether the controller's newest commands, as last looked at, are those of a safe stop."""
-        return self._safe_since_ns > 0
 
     def _role(self, name: str, now_ns: int) -> RoleView:
         status = self._statuses.get(name)

@@ -14,11 +14,13 @@ from bridge.errors import SurefootError
 from bridge.launch.display import Display
 from bridge.launch.launcher import Launcher, Phase, ProcessState
 from bridge.launch.monitor import Monitor, View
+from bridge.messages import GaitState
 from bridge.transport.zenoh import ZenohTransport
 
 SOURCE = "perception"  # what it publishes is lost on those that do not listen yet
 POLL_S: Final = 0.05
 SETTLE_LIMIT_S: Final = 2.0  # the safe command is due 0.2 s after the last horizon
+AT_REST: Final = (GaitState.SAFE_STOP, GaitState.DISARMED)
 
 
 class Limits(NamedTuple):
@@ -130,10 +132,11 @@ class Watch:
             return ""
         waited_s = self.elapsed_s - self._source_ended_s
         controller = self.view.roles.get("controller")
-        if self._monitor.stopped_safely():
-            return f"ended: the source is at its end and the controller holds the safe stop (after {waited_s:.2f} s)"
+        command = self.view.command.message
+        if command is not None and command.state in AT_REST:
+            return f"ended: the source is at its end, the controller commands {command.state}"
         if controller is None or not controller.alive:
             return "ended: the source is at its end"
         if waited_s > SETTLE_LIMIT_S:
-            return f"ended: the source is at its end; no safe stop was seen within {SETTLE_LIMIT_S:g} s"
+            return f"ended: the source is at its end; the controller did not stop within {SETTLE_LIMIT_S:g} s"
         return ""

@@ -86,6 +86,13 @@ def test_a_stamp_from_the_future_is_refused(hub: MemoryHub, clock: ManualClock) 
     assert inbox.read(clock.now_ns()).ok
 
 
+def test_what_arrives_while_the_reader_is_held_up_is_not_from_the_future(hub: MemoryHub, clock: ManualClock) -> None:
+    inbox, outbox = Inbox[Wrench](hub.transport(), WRENCH), Outbox(hub.transport(), WRENCH)
+    turn_began_ns = clock.now_ns()
+    outbox.send(wrench(clock.advance(0.2)))
+    assert inbox.read(turn_began_ns).ok
+
+
 @pytest.mark.parametrize(
     ("payload", "says"),
     [

@@ -144,15 +144,6 @@ class TestMonitor:
         assert not roles["drive"].alive
         assert roles["drive"].age_s == pytest.approx(2.0)
 
-    def test_safe_stop_is_what_the_newest_command_says(self) -> None:
-        world = World()
-        for state, safe in ((GaitState.FOLLOW, False), (GaitState.SAFE_STOP, True), (GaitState.GUARD, False)):
-            world.command.send(command(world.clock.advance(0.01), state))
-            view = world.monitor.look()
-            assert view.command.message is not None
-            assert view.command.message.state is state
-            assert world.monitor.stopped_safely() is safe
-
 
 class TestScreen:
     @pytest.fixture
@@ -280,15 +271,16 @@ class TestWatch:
         watch.turn(None)
         return world, launcher, watch
 
-    def test_ends_when_the_controller_holds_the_safe_stop(self) -> None:
+    @pytest.mark.parametrize("rest", [GaitState.SAFE_STOP, GaitState.DISARMED])
+    def test_ends_when_the_controller_holds_still(self, rest: GaitState) -> None:
         world, launcher, watch = self.running()
         world.command.send(command(world.clock.now_ns()))
         launcher.phases["perception"] = Phase.FINISHED
         assert watch.turn(None) == ""
         assert "finished" in watch.news
         assert watch.turn(None) == "", "the controller still follows"
-        world.command.send(command(world.clock.advance(0.1), GaitState.SAFE_STOP))
-        assert "safe stop" in watch.turn(None)
+        world.command.send(command(world.clock.advance(0.1), rest))
+        assert rest in watch.turn(None)
 
     def test_ends_at_once_where_no_controller_is_left(self) -> None:
         world, launcher, watch = self.running()

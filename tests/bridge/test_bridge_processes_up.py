@@ -44,7 +44,7 @@ def test_end_of_the_source_ends_everything_after_the_safe_stop(stage: Stage) -> 
     assert (code, errors) == (0, "")
     states = [record["command"]["state"] for record in up.seen if record.get("command")]
     assert states[-1] == "SAFE_STOP"
-    assert any("safe stop" in event for event in up.events)
+    assert any("SAFE_STOP" in event for event in up.events)
     assert up.seen[-1]["roles"]["perception"]["phase"] == "finished"
     assert up.seen[-1]["roles"]["perception"]["restarts"] == 0
     assert stage.left() == []
