@@ -31,7 +31,8 @@ STATE_COLOUR: Final = {
 LABEL_COLOUR: Final = {-1: STABLE, 0: TRANSIENT, 1: FALL}
 LABEL_TEXT: Final = {-1: "walking", 0: "falling", 1: "lying"}
 DOTS_PER_INCH: Final = 110
-COLOURS: Final = 96  # of the file's palette: an eighth of the size, and no difference to the eye
+LEFT, RIGHT = 0.085, 0.915  # of the panels, in figure widths
+COLOURS: Final = 255  # of the file's palette: a third of the size, and no difference to the eye
 
 
 class Labels(NamedTuple):
@@ -57,7 +58,7 @@ def write(picture: Picture, path: Path) -> None:
     figure = draw(picture)
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(path.name + ".part")
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     from PIL import Image  # noqa: PLC0415 (comes with matplotlib; needed at the very end only)
 
@@ -68,17 +69,18 @@ def write(picture: Picture, path: Path) -> None:
 
 def draw(picture: Picture) -> Figure:
     """Return the figure."""
-    figure = Figure(figsize=(11.5, 11.6), facecolor="white")
+    figure = Figure(figsize=(11.5, 10.9), facecolor="white", dpi=DOTS_PER_INCH)
+    figure.suptitle(picture.title, x=LEFT, ha="left", y=0.988, va="top", fontsize=13.5, fontweight="bold", color=INK)
+    top = GridSpec(1, 1, figure, left=LEFT, right=RIGHT, top=0.915, bottom=0.775)
     grid = GridSpec(
-        7, 1, figure, height_ratios=(2.0, 0.5, 1.35, 1.25, 0.85, 1.15, 1.15), hspace=0.17,
-        left=0.082, right=0.918, top=0.945, bottom=0.045,
+        6, 1, figure, height_ratios=(0.5, 1.35, 1.2, 0.8, 1.1, 1.1), hspace=0.14,
+        left=LEFT, right=RIGHT, top=0.755, bottom=0.048,
     )  # fmt: skip
-    figure.suptitle(picture.title, x=0.082, ha="left", y=0.985, fontsize=13, fontweight="bold", color=INK)
     columns = _columns(picture.rows)
     end_s = float(columns["time_s"][-1]) if len(picture.rows) else 1.0
-    band = figure.add_subplot(grid[1])
-    panels = [figure.add_subplot(grid[index], sharex=band) for index in range(2, 7)]
-    _draw_skeletons(figure, grid, picture)
+    band = figure.add_subplot(grid[0])
+    panels = [figure.add_subplot(grid[index], sharex=band) for index in range(1, 6)]
+    _draw_skeletons(figure, top[0], picture)
     _draw_states(band, panels, picture)
     _draw_probabilities(panels[0], columns)
     _draw_distance(panels[1], columns, picture.thresholds)
@@ -90,6 +92,7 @@ def draw(picture: Picture) -> Figure:
         panel.tick_params(labelbottom=panel is panels[-1], labelsize=9, colors=INK)
         for side in ("top", "right"):
             panel.spines[side].set_visible(False)
+        panel.yaxis.set_label_coords(-0.055, 0.5)
     panels[-1].set_xlabel("time in the recording [s]", fontsize=10)
     return figure
 
@@ -98,11 +101,10 @@ def _columns(rows: Sequence[Row]) -> dict[str, Any]:
     return {name: np.array([getattr(row, name) for row in rows]) for name in Row._fields}
 
 
-def _draw_skeletons(figure: Any, grid: Any, picture: Picture) -> None:
+def _draw_skeletons(figure: Any, cell: Any, picture: Picture) -> None:
     count = max(len(picture.snapshots), 1)
-    cells = grid[0].subgridspec(1, count, wspace=0.04)
-    everything = [points for shot in picture.snapshots for points in (shot.present_px, shot.later_px)]
-    half = _half_size(everything)
+    cells = cell.subgridspec(1, count, wspace=0.04)
+    half = _half_size([points for shot in picture.snapshots for points in (shot.present_px, shot.later_px)])
     for index, shot in enumerate(picture.snapshots):
         axes = figure.add_subplot(cells[index])
         centre = _centre(shot)
@@ -113,19 +115,16 @@ def _draw_skeletons(figure: Any, grid: Any, picture: Picture) -> None:
         ):
             _draw_skeleton(axes, points, picture.links, colour, width, order)
         axes.set_xlim(centre[0] - half, centre[0] + half)
-        axes.set_ylim(centre[1] + 1.3 * half, centre[1] - 1.3 * half)
+        axes.set_ylim(centre[1] + 1.08 * half, centre[1] - 1.08 * half)
         axes.set_aspect("equal")
         axes.set_xticks([])
         axes.set_yticks([])
         for spine in axes.spines.values():
             spine.set_color("#dddddd")
         axes.set_title(f"{shot.time_s:.1f} s", fontsize=9.5, color=INK, pad=3)
-    keys = (("now", INK), ("forecast for 500 ms ahead", FORECAST), ("where the body was then", FAINT))
-    for index, (text, colour) in enumerate(keys):
-        figure.text(
-            0.918 - 0.165 * (len(keys) - 1 - index), 0.975, text, color=colour, fontsize=9.5, ha="right", va="bottom",
-            fontweight="bold",
-        )  # fmt: skip
+    keys = (("now", INK), ("forecast for 500 ms later", FORECAST), ("what came 500 ms later", FAINT))
+    for place, (text, colour) in zip((0.0, 0.055, 0.27), keys, strict=True):
+        figure.text(LEFT + place, 0.943, text, color=colour, fontsize=10, va="bottom", fontweight="bold")
 
 
 def _draw_skeleton(axes: Any, points: Floats, links: Any, colour: str, width: float, order: int) -> None:
@@ -156,7 +155,9 @@ def _draw_states(band: Any, panels: Sequence[Any], picture: Picture) -> None:
         colour = STATE_COLOUR.get(state, "#ffffff")
         band.axvspan(start, stop, 0.0, 0.56, facecolor=colour, edgecolor="white", linewidth=0.8)
         if stop - start > 0.075 * len(state) * (times[-1] / 14.0 if times else 1.0):
-            band.text(0.5 * (start + stop), 0.26, state, ha="center", va="center", fontsize=8.5, color=INK, clip_on=True)
+            band.text(
+                0.5 * (start + stop), 0.26, state, ha="center", va="center", fontsize=8.5, color=INK, clip_on=True
+            )
         if state != "FOLLOW":
             for panel in panels:
                 panel.axvspan(start, stop, facecolor=colour, alpha=0.28, linewidth=0, zorder=0)
@@ -166,7 +167,9 @@ def _draw_states(band: Any, panels: Sequence[Any], picture: Picture) -> None:
             colour = LABEL_COLOUR.get(int(label), FAINT)
             band.axvspan(start, stop, 0.66, 1.0, facecolor=colour, alpha=0.85, edgecolor="white", linewidth=0.8)
             text = LABEL_TEXT.get(int(label), str(label))
-            band.text(0.5 * (start + stop), 0.82, text, ha="center", va="center", fontsize=8.5, color="white", clip_on=True)
+            band.text(
+                0.5 * (start + stop), 0.82, text, ha="center", va="center", fontsize=8.5, color="white", clip_on=True
+            )
             if int(label) >= 0:
                 for panel in panels:
                     panel.axvline(start, color=colour, linewidth=1.1, linestyle=(0, (1, 1.5)), zorder=1)
@@ -178,6 +181,10 @@ def _draw_states(band: Any, panels: Sequence[Any], picture: Picture) -> None:
     band.tick_params(axis="x", length=0)
     band.spines["left"].set_visible(False)
     band.spines["bottom"].set_visible(False)
+
+
+def _write_in(band: Any, time_s: float, height: float, text: str, colour: str) -> None:
+    band.text(time_s, height, text, ha="center", va="center", fontsize=8.5, color=colour, clip_on=True)
 
 
 def _draw_probabilities(axes: Any, columns: dict[str, Any]) -> None:
@@ -202,9 +209,7 @@ def _draw_distance(axes: Any, columns: dict[str, Any], thresholds: InterventionC
         (thresholds.distance_full_sd, FALL, "full risk"),
     ):
         axes.axhline(value, color=colour, linewidth=0.9)
-        axes.annotate(
-            text, (1.005, value), xycoords=("axes fraction", "data"), fontsize=8, color=colour, va="center"
-        )
+        axes.annotate(text, (1.005, value), xycoords=("axes fraction", "data"), fontsize=8, color=colour, va="center")
     axes.axhline(0.0, color=FAINT, linewidth=0.8, linestyle=":")
     axes.set_ylabel("distance to fall\nboundary [sd]", fontsize=10)
     _legend(axes, columns=2)
@@ -233,7 +238,7 @@ def _draw_motion(axes: Any, columns: dict[str, Any]) -> None:
     axes.plot(columns["time_s"], columns["command_x"], color=FORECAST, linewidth=2.2, label="base, commanded")
     axes.plot(columns["time_s"], columns["velocity_x"], color=INK, linewidth=1.1, label="base, measured")
     axes.axhline(0.0, color=FAINT, linewidth=0.8, linestyle=":")
-    axes.set_ylabel("forward velocity\n[m/s]", fontsize=10)
+    axes.set_ylabel("velocity x\n[m/s]", fontsize=10)
     twin = _twin(axes, height)
     twin.plot(columns["time_s"], columns["height"], color=height, linewidth=1.4)
     twin.set_ylabel("column\nheight [m]", fontsize=10, color=height)
@@ -247,6 +252,7 @@ def _draw_motion(axes: Any, columns: dict[str, Any]) -> None:
 def _twin(axes: Any, colour: str) -> Any:
     twin = axes.twinx()
     twin.tick_params(labelsize=9, colors=colour)
+    twin.yaxis.set_label_coords(1.055, 0.5)
     for side in ("top", "left", "bottom"):
         twin.spines[side].set_visible(False)
     twin.spines["right"].set_color(colour)
