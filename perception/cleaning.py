@@ -30,7 +30,14 @@ RATE_HZ: Final = 30.0
 
 PERIOD_NS: Final = round(NS / RATE_HZ)
 
+_LONG_S = 1e6
+_SLACK_S = 1e-3  # a bound of a whole number of frames does not hang on the rounding of stamps
+
 _PHASE_GAIN = 0.1  # share of a frame's distance from its tick by which the grid follows the camera
+
+_MEASURED = np.uint8(KeypointStatus.MEASURED)  # as the arrays hold them: looking up an enum's member is slow
+_FILLED = np.uint8(KeypointStatus.FILLED)
+_LOST = np.uint8(KeypointStatus.LOST)
 
 Mask = NDArray[np.bool_]
 
@@ -91,12 +98,12 @@ class Cleaner:
             step_ns = stamp_ns - self._newest_ns
             if step_ns <= 0:
                 return []
-            if step_ns > self._config.fill_s * NS:
+            if step_ns > (self._config.fill_s + _SLACK_S) * NS:
                 self._restart()
         self._newest_ns = stamp_ns
         now_s = (stamp_ns - self._origin_ns) / NS
         points = self._lines.push(np.asarray(keypoints, dtype=np.float64), stamp_ns, now_s, self._scale.length_px)
-        measured = np.where((points.status == KeypointStatus.MEASURED)[:, None], points.position_px, np.nan)
+        measured = np.where((points.status == _MEASURED)[:, None], points.position_px, np.nan)
         body_length = self._scale.update(measured, now_s)
         return [
             CleanFrame(
@@ -164,7 +171,7 @@ class _Lines:
         detected = (confidence >= self._config.min_confidence) & np.isfinite(keypoints).all(axis=1)
 
         elapsed_s = now_s - self._last_s
-        alive = elapsed_s <= self._config.fill_s
+        alive = elapsed_s <= self._config.fill_s + _SLACK_S
         step = position - self._last
         distance = np.hypot(step[:, 0], step[:, 1])
         reach = self._config.max_speed_body_lengths_s * body_length_px * elapsed_s
@@ -176,10 +183,10 @@ class _Lines:
         restarted = accepted & (~alive | moved_away)
 
         joined = (accepted & ~restarted)[:, None]
-        with np.errstate(invalid="ignore"):  # inf times zero on points that were never seen
-            continued = self._last + self._velocity * elapsed_s[:, None]
-            slope = step / elapsed_s[:, None]
-        self._velocity = np.where(joined, slope, np.where(restarted[:, None], 0.0, self._velocity))
+        span_s = np.minimum(elapsed_s, _LONG_S)[:, None]  # finite also on points that were never seen
+        continued = self._last + self._velocity * span_s
+        self._velocity = np.where(joined, step / span_s, self._velocity)
+        self._velocity[restarted] = 0.0
         self._last = np.where(accepted[:, None], position, self._last)
         self._last_s = np.where(accepted, now_s, self._last_s)
         self._rejected = np.where(out_of_reach[:, None], position, self._rejected)
@@ -187,8 +194,8 @@ class _Lines:
 
         filled = alive & ~accepted
         kept = accepted | filled
-        status = np.where(accepted, KeypointStatus.MEASURED, KeypointStatus.FILLED).astype(np.uint8)
-        status[~kept] = KeypointStatus.LOST
+        status = np.where(accepted, _MEASURED, _FILLED)
+        status[~kept] = _LOST
         path = np.where(accepted[:, None], position, continued)
         path[~kept] = np.nan
         measured_confidence = np.where(accepted, np.minimum(confidence, 1.0), 0.0)
@@ -223,7 +230,7 @@ class _Grid:
             else:
                 tick = _between(self._before, points, self._next_ns)
                 self._next_ns += PERIOD_NS
-            lost = tick.status == KeypointStatus.LOST
+            lost = tick.status == _LOST
             ticks.append(tick._replace(restarted=self._pending & ~lost))
             self._pending = lost
         self._before = points
@@ -236,9 +243,9 @@ def _between(before: _Points, after: _Points, stamp_ns: int) -> _Points:
     position = before.position_px + weight * (after.position_px - before.position_px)
     position[after.restarted] = np.nan
     status = np.maximum(before.status, after.status)
-    status[after.restarted] = KeypointStatus.LOST
+    status[after.restarted] = _LOST
     confidence = np.where(
-        status == KeypointStatus.MEASURED,
+        status == _MEASURED,
         before.confidence + weight * (after.confidence - before.confidence),
         0.0,
     )
