@@ -36,14 +36,14 @@ def assess(
     if not out.parent.is_dir():
         raise SurefootError(f"--out {out}: no such folder: {out.parent}")
     parsed = load_config(config, settings or [])
-    clips = read_clips(files)
+    clips = read_clips(files, parsed.perception.source)
     results: dict[str, Assessment] = {}
     with Progress(console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("assessing", total=sum(len(clip.keypoints) for clip in clips))
+        task = progress.add_task("assessing", total=sum(len(clip.stamps_ns) for clip in clips))
         for clip in clips:
             progress.update(task, description=clip.name)
             results[clip.name] = assess_clip(clip, parsed)
-            progress.advance(task, len(clip.keypoints))
+            progress.advance(task, len(clip.stamps_ns))
     write_results(results, out)
     typer.echo(_summary(clips, results))
 
@@ -69,5 +69,5 @@ def _summary(clips: list[Clip], results: dict[str, Assessment]) -> str:
         result = results[clip.name]
         states = sorted(set(result.state.tolist()), key=result.state.tolist().index)
         peak = np.nanmax(result.stiffening) if np.isfinite(result.stiffening).any() else float("nan")
-        lines.append(f"{clip.name}: {len(clip.keypoints)} frames, {' -> '.join(states)}, peak stiffening {peak:.2f}")
+        lines.append(f"{clip.name}: {len(clip.stamps_ns)} frames, {' -> '.join(states)}, peak stiffening {peak:.2f}")
     return "\n".join(lines)

@@ -55,7 +55,7 @@ def _run(clip: Clip, system: LockStep) -> Assessment:
     wire = system.hub.transport()
     horizons: Inbox[FallHorizon] = Inbox(wire, FALL_HORIZON, max_age_s=float("inf"))
     commands: Inbox[SupportCommand] = Inbox(wire, SUPPORT_COMMAND, max_age_s=float("inf"))
-    frames = len(clip.keypoints)
+    frames = len(clip.stamps_ns)
     result = Assessment(
         probabilities=np.full((frames, STEPS, 3), np.nan),
         distance=np.full((frames, STEPS), np.nan),
@@ -64,9 +64,8 @@ def _run(clip: Clip, system: LockStep) -> Assessment:
         quality=np.full(frames, np.nan),
     )
     seen = False
-    for frame in range(frames):
-        now_ns = START_NS + round(frame * NS / clip.fps)
-        system.advance_to(now_ns)
+    for frame, offset_ns in enumerate(clip.stamps_ns):
+        system.advance_to(START_NS + offset_ns)
         system.settle()
         horizon = horizons.read(system.clock.now_ns())
         seen = seen or horizon.message is not None
