@@ -18,7 +18,7 @@ class SupervisorConfig(Section):
     guard_off: float = Field(default=0.10, ge=0, lt=1)
     """Largest risk over the horizon below which GUARD becomes FOLLOW again."""
 
-    guard_dwell_s: float = Field(default=0.03, ge=0, le=1)
+    guard_dwell_s: float = Field(default=0.05, ge=0, le=1)
     """How long the risk must be there before GUARD [s]; one frame of the camera is not enough."""
 
     calm_dwell_s: float = Field(default=0.5, ge=0, le=10)
@@ -33,8 +33,8 @@ class SupervisorConfig(Section):
     arrest_reach_s: float = Field(default=0.1, ge=0, le=0.5)
     """How far ahead a risk counts for ARREST [s]; what lies further stiffens the prediction alone."""
 
-    arrest_dwell_s: float = Field(default=0.03, ge=0, le=1)
-    """How long that risk must be there before ARREST [s]."""
+    arrest_dwell_s: float = Field(default=0.05, ge=0, le=1)
+    """How long that risk must be there before ARREST [s]; meanwhile the stiffening follows the risk already."""
 
     arrest_hold_s: float = Field(default=1.0, ge=0, le=30)
     """How long risk, load and descent must all be low before ARREST ends [s]."""

@@ -236,6 +236,11 @@ class TestTime:
 
 
 class TestOrder:
+    def test_numbers_count_unless_told_otherwise(self) -> None:
+        gate = SafetyGate(LIMITS, column_height_m=1.0)
+        gate.filter(command(NS, sequence=7), NS)
+        assert not gate.filter(command(NS + MS, sequence=6), NS + MS).valid
+
     def test_older_number_is_refused(self) -> None:
         gate = make_gate()
         gate.filter(command(NS, sequence=7), NS)
@@ -367,6 +372,14 @@ class TestStopping:
         assert out.valid
         assert abs(out.velocity[0]) <= 0.1 + 1e-12  # at most 50 ms of acceleration
 
+    def test_a_short_sleep_is_braked_for_as_long_as_it_lasted(self) -> None:
+        """120 ms: two steps of 50 ms at -2 m/s^2, then 20 ms in which the command is back and -2 winds down to -1.2."""
+        gate = make_gate()
+        run(gate, (0.8, 0.0, 0.0, 0.0), NS, 100)
+        wake_ns = NS + 99 * PERIOD_NS + 120 * MS
+        out = gate.filter(command(wake_ns, velocity=np.array([0.8, 0, 0, 0]), sequence=10**6), wake_ns)
+        assert out.velocity[0] == pytest.approx(0.8 - 0.1 - 0.1 - 1.2 * 0.02)
+
     def test_column_that_was_moving_when_the_process_froze_went_on_until_it_stopped(self) -> None:
         gate, now_ns = moving(velocity=(0.0, 0.0, 0.0, 0.4), periods=30)
         before = gate.filter(None, now_ns).column_height
@@ -430,6 +443,11 @@ class TestHolding:
         assert [o.column_height for o in up] == pytest.approx([1.0, 1.004, 1.008])
         down = run(make_gate(), np.zeros(4), NS, 3, column_height=0.7)
         assert [o.column_height for o in down] == pytest.approx([1.0, 0.996, 0.992])
+
+    @pytest.mark.parametrize(("height", "velocity"), [(1.4, 0.4), (0.6, -0.4)])
+    def test_column_keeps_its_speed_where_there_is_room(self, height: float, velocity: float) -> None:
+        gate = make_gate(column_height_m=height)
+        assert run(gate, (0, 0, 0, velocity), NS, 30, column_height=height)[-1].velocity[3] == pytest.approx(velocity)
 
     @pytest.mark.parametrize("direction", [-1.0, 1.0])
     def test_column_slows_before_the_end_of_its_stroke(self, direction: float) -> None:
