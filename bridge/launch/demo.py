@@ -134,7 +134,7 @@ def _write(
     part.write_text(to_csv(rows))
     part.replace(out / "timeline.csv")
     links = importlib.import_module("perception.skeleton").LINKS
-    title = "A fall, seen coming: generated keypoints through perception, anticipation and controller"
+    title = "A generated walk, stumble and fall, through perception, anticipation and controller"
     snapshots = [recorder.snapshot(time_s) for time_s in _moments(rows, summary)]
     write(Picture(title, rows, snapshots, labels, config.intervention, links), out / "timeline.png")
 

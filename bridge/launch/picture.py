@@ -123,7 +123,7 @@ def _draw_skeletons(figure: Any, cell: Any, picture: Picture) -> None:
             spine.set_color("#dddddd")
         axes.set_title(f"{shot.time_s:.1f} s", fontsize=9.5, color=INK, pad=3)
     keys = (("now", INK), ("forecast for 500 ms later", FORECAST), ("what came 500 ms later", FAINT))
-    for place, (text, colour) in zip((0.0, 0.055, 0.27), keys, strict=True):
+    for place, (text, colour) in zip((0.0, 0.05, 0.24), keys, strict=True):
         figure.text(LEFT + place, 0.943, text, color=colour, fontsize=10, va="bottom", fontweight="bold")
 
 
@@ -154,7 +154,7 @@ def _draw_states(band: Any, panels: Sequence[Any], picture: Picture) -> None:
             continue
         colour = STATE_COLOUR.get(state, "#ffffff")
         band.axvspan(start, stop, 0.0, 0.56, facecolor=colour, edgecolor="white", linewidth=0.8)
-        if stop - start > 0.075 * len(state) * (times[-1] / 14.0 if times else 1.0):
+        if stop - start > 0.11 * len(state) * (times[-1] / 14.0 if times else 1.0):
             band.text(
                 0.5 * (start + stop), 0.26, state, ha="center", va="center", fontsize=8.5, color=INK, clip_on=True
             )

@@ -13,7 +13,7 @@ import numpy as np
 
 from simulation.kinematic.body import Floats, Posture, add, blend, standing
 
-STEP_S: Final = 1.0 / 960.0  # of the integrations
+STEP_S: Final = 1.0 / 480.0  # grid of all motion and integration; frames take the nearest time on it
 
 
 class Event(Protocol):
