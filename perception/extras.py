@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 from typing import Any
 
 from bridge.errors import MissingExtraError
@@ -22,6 +23,7 @@ def load_extra(module: str, what: str, package: str, extra: str) -> Any:
 
 def load_opencv(what: str, extra: str) -> Any:
     """Return `cv2`: silent, because what goes wrong is raised; on one thread, because the networks want the cores."""
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # read once, when FFmpeg is first used
     cv2 = load_extra("cv2", what, "opencv-python-headless", extra)
     cv2.setNumThreads(1)
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)

@@ -13,15 +13,19 @@ _GREY = 114  # the border YOLO networks are trained with
 
 
 class Letterbox(NamedTuple):
-    """Scale and border: network pixel = image pixel * scale + border."""
+    """Scale and border: network pixel = image pixel * scale + border.
 
-    scale: float
+    The two scales differ by the rounding of the scaled image to whole pixels.
+    """
+
+    scale_x: float
+    scale_y: float
     left: int  # [network px]
     top: int  # [network px]
 
     def to_image(self, xy: Floats) -> Floats:
         """Map points (..., 2) from the network's pixels to the image's."""
-        image_xy: Floats = (xy - np.array([self.left, self.top])) / self.scale
+        image_xy: Floats = (xy - np.array([self.left, self.top])) / np.array([self.scale_x, self.scale_y])
         return image_xy
 
 
@@ -34,4 +38,4 @@ def letterbox(cv2: Any, image_rgb: Image, width: int, height: int) -> tuple[Imag
     framed = np.full((height, width, 3), _GREY, dtype=np.uint8)
     resized = cv2.resize(image_rgb, (used_width, used_height), interpolation=cv2.INTER_LINEAR)
     framed[top : top + used_height, left : left + used_width] = resized
-    return framed, Letterbox(scale, left, top)
+    return framed, Letterbox(used_width / image_width, used_height / image_height, left, top)

@@ -12,6 +12,7 @@ import math
 import zipfile
 import zlib
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -87,16 +88,23 @@ def stills(clip: Clip) -> Iterator[Still]:
         yield Still(offset_ns, clip.width, clip.height, None, (person,) if found else ())
 
 
-def _open(path: Path) -> Any:
+@contextmanager
+def _open(path: Path) -> Iterator[Any]:
     if not path.is_file():
         raise SourceError(f"{path}: no such keypoint file")
     try:
-        arrays = np.load(path, allow_pickle=False)
-    except _DAMAGE as error:
-        raise SourceError(f"{path}: not a readable npz file ({_one_line(error)})") from error
-    if not isinstance(arrays, np.lib.npyio.NpzFile):
-        raise SourceError(f"{path}: a single array, expected an npz file of clips")
-    return arrays
+        opened = path.open("rb")
+    except OSError as error:
+        raise SourceError(f"{path}: cannot be read ({error.strerror})") from error
+    with opened as file:
+        try:
+            arrays = np.load(file, allow_pickle=False)
+        except _DAMAGE as error:
+            raise SourceError(f"{path}: not a readable npz file ({_one_line(error)})") from error
+        if not isinstance(arrays, np.lib.npyio.NpzFile):
+            raise SourceError(f"{path}: a single array, expected an npz file of clips")
+        with arrays:
+            yield arrays
 
 
 def _read(path: Path, arrays: Any, key: str) -> NDArray[Any]:
@@ -128,7 +136,7 @@ def _find(path: Path, arrays: Any, name: str) -> str:
         raise SourceError(
             f"{path}: holds {len(names)} clips, name one as {path.name}:CLIP ({some}{', ...' if names[3:] else ''})"
         )
-    if name in names and name in keys:
+    if name in keys:
         return name
     for array in _PREFERRED:
         if f"{name}/{array}" in keys:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -28,7 +27,6 @@ def open_video(path: Path, crop: Crop | None, default_fps_hz: float) -> Iterator
     if not path.is_file():
         raise SourceError(f"{path}: no such video file")
     cv2 = load_opencv("reading video", "video")
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # a broken file is said once, by us
     capture = cv2.VideoCapture(str(path))
     if not capture.isOpened():
         raise SourceError(f"{path}: not a video that OpenCV can open")
