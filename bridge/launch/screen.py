@@ -11,7 +11,7 @@ from rich.text import Text
 
 from bridge.launch.launcher import Phase, ProcessState
 from bridge.launch.monitor import RoleView, View
-from bridge.messages import SupportCommand
+from bridge.messages import NodeStatus, SupportCommand
 
 _LEVELS = ("green", "yellow", "red", "red")  # ok, warning, error, stale, as in diagnostic_msgs
 _UNKNOWN = RoleView(False, None, float("inf"))
@@ -22,7 +22,9 @@ def table(elapsed_s: float, processes: Mapping[str, ProcessState], view: View, n
     """Return the screen: one row per role, and what the controller does."""
     grid = Table(title=f"surefoot up  {elapsed_s:6.1f} s", title_justify="left", expand=True)
     for name in ("role", "state", "wire", "pid", "rate [Hz]", "age of inputs [ms]", "restarts"):
-        grid.add_column(name, justify="right" if name in {"pid", "rate [Hz]", "restarts"} else "left", no_wrap=True)
+        grid.add_column(
+            Text(name), justify="right" if name in {"pid", "rate [Hz]", "restarts"} else "left", no_wrap=True
+        )
     grid.add_column("says", ratio=1, no_wrap=True, overflow="ellipsis")
     for role in _roles(processes, view):
         seen, process = view.roles.get(role, _UNKNOWN), processes.get(role)
@@ -92,8 +94,8 @@ def _command_line(view: View) -> str:
         return view.command.fault
     forward, left, yaw, column = (value + 0.0 for value in command.velocity.round(2))  # + 0.0: no minus zero
     text = (
-        f"{command.state}  stiffening {command.stiffening:.2f}  distance {command.fall_distance:.2f} sd"
-        f"  fall {command.fall_probability:.2f}  velocity {forward:.2f} {left:.2f} m/s, {yaw:.2f} rad/s"
+        f"{command.state}  stiffening {command.stiffening:.2f}  distance {_number(command.fall_distance)} sd"
+        f"  fall {_number(command.fall_probability)}  velocity {forward:.2f} {left:.2f} m/s, {yaw:.2f} rad/s"
         f", column {column:.2f} m/s"
     )
     said = [part for part in (command.reason, view.command.fault) if part]
@@ -104,35 +106,40 @@ def _roles(processes: Mapping[str, ProcessState], view: View) -> list[str]:
     return [*processes, *(role for role in view.roles if role not in processes)]
 
 
+def _current(seen: RoleView) -> NodeStatus | None:
+    """Return the role's last report if it still describes the present."""
+    return seen.status if seen.alive and seen.age_s <= _STATUS_MAX_AGE_S else None
+
+
 def _value(seen: RoleView, name: str) -> str:
-    if seen.status is None or seen.age_s > _STATUS_MAX_AGE_S:
-        return ""
-    return seen.status.values.get(name, "")
+    status = _current(seen)
+    return "" if status is None else status.values.get(name, "")
 
 
 def _ages(seen: RoleView) -> dict[str, str]:
     """Return the ages that a role reports, by the input's name."""
-    if seen.status is None or seen.age_s > _STATUS_MAX_AGE_S:
-        return {}
+    status = _current(seen)
+    values = {} if status is None else status.values
     return {
-        name.replace("age_ms", "").strip("_.") or "input": value
-        for name, value in seen.status.values.items()
-        if "age_ms" in name
+        name.replace("age_ms", "").strip("_.") or "input": value for name, value in values.items() if "age_ms" in name
     }
 
 
 def _summary(process: ProcessState | None, seen: RoleView) -> Text:
     if process is not None and process.phase in {Phase.FAILED, Phase.REFUSED}:
         return Text(process.last_line or f"exit code {process.exit_code}", style="red")
-    if seen.status is None or seen.age_s > _STATUS_MAX_AGE_S:
-        return Text("")
-    return Text(seen.status.summary, style=_LEVELS[min(max(seen.status.level, 0), 3)])
+    status = _current(seen)
+    return Text("") if status is None else Text(status.summary, style=_LEVELS[min(max(status.level, 0), 3)])
 
 
 def _phase_style(process: ProcessState | None) -> str:
     if process is None:
         return "dim"
     return {Phase.RUNNING: "green", Phase.FAILED: "red", Phase.REFUSED: "red"}.get(process.phase, "yellow")
+
+
+def _number(value: float) -> str:
+    return f"{value:.2f}" if math.isfinite(value) else "-"
 
 
 def _finite(value: float) -> float | None:

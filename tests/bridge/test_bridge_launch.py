@@ -165,6 +165,7 @@ class TestScreen:
         row = next(line for line in text.splitlines() if "controller" in line)
         for word in ("running", "alive", "4711", "100.0", "horizon 21", "wrench 4", "3", "controller is well"):
             assert word in row
+        assert "age of inputs [ms]" in text
         assert "elsewhere" in next(line for line in text.splitlines() if "drive" in line)
         for word in ("FOLLOW", "0.75", "risk [0.8] is high", "0.40 0.00 m/s, 0.00 rad/s", "a notice"):
             assert word in text
