@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import simulation
-from perception.skeleton import MIRROR
 from simulation.kinematic.camera import Camera
 from simulation.kinematic.detector import Detector
 from simulation.kinematic.fall import Fall
