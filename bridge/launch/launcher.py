@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from bridge.config.surefoot import SurefootConfig
-from bridge.errors import SurefootError
+from bridge.errors import ConfigError, SurefootError
 from bridge.launch.logfile import LogFile
 
 BAD_INPUT = SurefootError.exit_code
@@ -69,11 +69,17 @@ class Launcher:
             overrides: `section.key=value` on top of the file.
             options: options of each role, by name; they win over the config.
             log_dir: folder for `ROLE.log`; None keeps the logs in a temporary folder.
+
+        Raises:
+            ConfigError: `log_dir` cannot be made or written.
         """
         self._launch = config.launch
         self._temporary = tempfile.TemporaryDirectory(prefix="surefoot-") if log_dir is None else None
         folder = log_dir or Path(self._temporary.name if self._temporary else ".")
-        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ConfigError(f"{folder}: cannot be made for the logs: {error.strerror}") from error
         common = [*(["--config", str(config_path)] if config_path else [])]
         common += [word for override in overrides for word in ("--set", override)]
         given = options or {}

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from bridge.errors import ConfigError
+
 LIMIT_BYTES = 1 << 20
 _TAIL_BYTES = 4096
 
@@ -25,9 +27,16 @@ class LogFile:
         self._lines: list[str] = []
 
     def open(self) -> int:
-        """Return a file descriptor for a new process; the caller closes its copy."""
+        """Return a file descriptor for a new process; the caller closes its copy.
+
+        Raises:
+            ConfigError: the file cannot be written.
+        """
         self._rotate()
-        descriptor = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+        try:
+            descriptor = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+        except OSError as error:
+            raise ConfigError(f"{self.path}: cannot be written: {error.strerror}") from error
         self._start = os.fstat(descriptor).st_size
         return descriptor
 

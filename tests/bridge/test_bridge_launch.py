@@ -16,10 +16,10 @@ from rich.console import Console
 
 from bridge.clock import ManualClock
 from bridge.config.load import load_config
-from bridge.errors import SurefootError, TransportError
+from bridge.errors import ConfigError, SurefootError, TransportError
 from bridge.launch import screen
 from bridge.launch.display import Lines, Screen
-from bridge.launch.launcher import Phase, ProcessState
+from bridge.launch.launcher import Launcher, Phase, ProcessState
 from bridge.launch.logfile import LogFile
 from bridge.launch.monitor import Monitor
 from bridge.launch.ports import require_free
@@ -60,6 +60,15 @@ class TestLogFile:
         assert {path.name for path in tmp_path.iterdir()} == {"drive.log", "drive.log.1"}
         kept = (tmp_path / "drive.log.1").read_text() + log.path.read_text()
         assert kept.endswith("line 049\n")
+
+
+def test_logs_that_cannot_be_written_are_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ConfigError, match="file/logs: cannot be made"):
+        Launcher(load_config(None), log_dir=tmp_path / "file" / "logs")
+    (tmp_path / "drive.log").mkdir()
+    with pytest.raises(ConfigError, match=r"drive\.log: cannot be written"):
+        LogFile(tmp_path, "drive").open()
 
 
 class TestPorts:
