@@ -6,6 +6,7 @@ view, and poses unlike any in training.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple, Self
@@ -19,6 +20,7 @@ from perception.skeleton import LINKS
 
 _TRIMMED: Final = 0.02  # share of the training poses left out as detector errors
 _RARE: Final = 0.99  # quantile of the training poses that still counts as seen
+_SIZE_STEP: Final = math.log(1.25)  # a skeleton a quarter larger or smaller than any seen is one unit stranger
 
 _WEIGHT: Final = np.zeros(3)
 _WEIGHT[KeypointStatus.MEASURED] = 1.0
@@ -27,18 +29,20 @@ _WEIGHT[KeypointStatus.FILLED] = 0.5  # continued along a line: better than noth
 
 @dataclass(frozen=True)
 class PoseStatistics:
-    """What poses looked like in training: a Gaussian over coordinates and link lengths.
+    """What poses looked like in training: a Gaussian over coordinates and link lengths, and the range of sizes.
 
-    A pose is described by its 24 relative coordinates and its 12 link lengths (36 numbers, body lengths):
-    the coordinates alone would find a skeleton that collapsed into one point unremarkable.
+    A pose is described by its 24 relative coordinates and its 12 link lengths (36 numbers, body lengths).
+    A skeleton that collapsed into one point lies in the middle of that cloud, so the size, the sum of the
+    link lengths, is judged by itself.
     """
 
     mean: Floats  # (36,)
     whitening: Floats  # (36, 36): the distance of a pose is |(x - mean) @ whitening| / 6, about 1 in training
     limit: float  # distance that one training pose in a hundred exceeds
+    sizes: Floats  # (2,) smallest and largest sum of link lengths, but for one pose in a hundred [body lengths]
 
     def __post_init__(self) -> None:
-        for name, shape in (("mean", (36,)), ("whitening", (36, 36))):
+        for name, shape in (("mean", (36,)), ("whitening", (36, 36)), ("sizes", (2,))):
             array = np.array(getattr(self, name), dtype=np.float64)
             if array.shape != shape:
                 raise ValueError(f"pose statistics: {name} has shape {array.shape}, expected {shape}")
@@ -48,6 +52,8 @@ class PoseStatistics:
             object.__setattr__(self, name, array)
         if not 0 < self.limit < np.inf:
             raise ValueError(f"pose statistics: limit is {self.limit}, expected a positive number")
+        if not 0 < self.sizes[0] <= self.sizes[1]:
+            raise ValueError(f"pose statistics: sizes are {self.sizes}, expected two positive rising numbers")
 
     @classmethod
     def fit(cls, poses: NDArray[np.floating]) -> Self:
@@ -65,16 +71,19 @@ class PoseStatistics:
         distance = _distance(X, *_gaussian(X))
         mean, whitening = _gaussian(X[distance <= np.quantile(distance, 1.0 - _TRIMMED)])
         limit = np.quantile(_distance(X, mean, whitening), _RARE)
-        return cls(mean=mean, whitening=whitening, limit=float(limit))
+        sizes = np.quantile(_size(X), ((1.0 - _RARE) / 2, (1.0 + _RARE) / 2))
+        return cls(mean=mean, whitening=whitening, limit=float(limit), sizes=sizes)
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[np.float64]]) -> Self:
         """Rebuild from what `arrays` returned."""
-        return cls(mean=arrays["mean"], whitening=arrays["whitening"], limit=float(arrays["limit"]))
+        return cls(
+            mean=arrays["mean"], whitening=arrays["whitening"], limit=float(arrays["limit"]), sizes=arrays["sizes"]
+        )
 
     def arrays(self) -> dict[str, NDArray[np.float64]]:
         """Return the arrays by name."""
-        return {"mean": self.mean, "whitening": self.whitening, "limit": np.array(self.limit)}
+        return {"mean": self.mean, "whitening": self.whitening, "limit": np.array(self.limit), "sizes": self.sizes}
 
     @property
     def mean_pose(self) -> Floats:
@@ -82,8 +91,16 @@ class PoseStatistics:
         return self.mean[: 2 * KEYPOINTS].reshape(KEYPOINTS, 2)
 
     def strangeness(self, poses: NDArray[np.floating]) -> Floats:
-        """Distance of each pose (N, 12, 2) from those in training, as a multiple of the limit: (N,)."""
-        return _distance(_describe(poses), self.mean, self.whitening) / self.limit
+        """How unlike those in training each pose (N, 12, 2) is: (N,), 1 is as unlike as one training pose in 100.
+
+        The larger of the distance from the Gaussian and of what the size lacks or exceeds.
+        """
+        X = _describe(poses)
+        size = np.maximum(_size(X), 1e-6)
+        beyond = np.log(np.maximum(self.sizes[0] / size, size / self.sizes[1])) / _SIZE_STEP
+        by_size = np.where(beyond > 0, 1.0 + beyond, 0.0)
+        strangeness: Floats = np.maximum(_distance(X, self.mean, self.whitening) / self.limit, by_size)
+        return strangeness
 
 
 def _gaussian(X: Floats) -> tuple[Floats, Floats]:
@@ -97,6 +114,11 @@ def _gaussian(X: Floats) -> tuple[Floats, Floats]:
 def _describe(poses: NDArray[np.floating]) -> Floats:
     bones = poses[:, LINKS[:, 1]] - poses[:, LINKS[:, 0]]
     return np.concatenate((poses.reshape(len(poses), -1), np.hypot(bones[..., 0], bones[..., 1])), axis=1)
+
+
+def _size(X: Floats) -> Floats:
+    size: Floats = X[:, 2 * KEYPOINTS :].sum(axis=1)
+    return size
 
 
 def _distance(X: Floats, mean: Floats, whitening: Floats) -> Floats:

@@ -10,6 +10,7 @@ from anticipation.gait_state import DirectedGraphNetwork
 from anticipation.motion import DctMlpForecaster
 from anticipation.quality import PoseStatistics
 from anticipation.transient import TransientPlane
+from bridge.messages import Keypoints, KeypointStatus
 
 STANDING = np.array(  # l/r shoulder, elbow, wrist, hip, knee, ankle; about one body length tall, y down
     [
@@ -59,3 +60,34 @@ def random_checkpoint(seed: int = 0, features: str = "window") -> Checkpoint:
         temperature=np.linspace(1.0, 1.5, 16),
         provenance=Provenance(("made up",), "none", "none", {"accuracy": [0.3, 0.4]}),
     )
+
+
+START_NS = 1_000_000_000_000
+PERIOD_NS = 33_333_333
+
+
+def message(tick: int, pose: np.ndarray = STANDING, **changes: object) -> Keypoints:
+    """A message of tick `tick`: `pose` in body lengths, 100 px long, around (160, 120)."""
+    position = pose * 100 + (160, 120)
+    values = {
+        "stamp_ns": START_NS + tick * PERIOD_NS,
+        "position_px": position,
+        "confidence": np.where(np.isfinite(position[:, 0]), 0.9, 0.0),
+        "status": np.where(np.isfinite(position[:, 0]), KeypointStatus.MEASURED, KeypointStatus.LOST),
+        "body_length_px": 100.0,
+        "image_width": 320,
+        "image_height": 240,
+    }
+    return Keypoints(**(values | changes))
+
+
+def lost(tick: int, keypoints: list[int], pose: np.ndarray = STANDING, **changes: object) -> Keypoints:
+    """A message in which some keypoints are lost."""
+    pose = np.array(pose, dtype=float)
+    pose[keypoints] = np.nan
+    return message(tick, pose, **changes)
+
+
+def nobody(tick: int, reason: str = "nobody in view") -> Keypoints:
+    """A message that is not valid."""
+    return lost(tick, list(range(12)), valid=False, reason=reason, people=0, body_length_px=np.nan)
