@@ -26,6 +26,7 @@ from bridge.messages import KEYPOINTS, Floats
 from perception.sources.playback import Still
 
 _PREFERRED = ("keypoints", "alphapose", "movenet")  # where the clip has several and none is named
+_BESIDE = ("fps", "image_size", "label", "held")
 _MAX_FPS_HZ = 240.0
 _DAMAGE = (OSError, ValueError, EOFError, KeyError, NotImplementedError, zipfile.BadZipFile, zlib.error)
 
@@ -48,7 +49,7 @@ class Clip(NamedTuple):
 def clip_names(path: Path) -> list[str]:
     """Return the names of the clips in `path`, such as 'fall-01/alphapose' or 'walk'.
 
-    An array called NAME/keypoints is the clip NAME.
+    An array called NAME/keypoints is the clip NAME, and what lies beside it is no clip.
 
     Raises:
         SourceError: no such file, or not a readable npz.
@@ -120,9 +121,15 @@ def _one_line(error: Exception) -> str:
 
 
 def _clip_names(arrays: Any) -> list[str]:
-    beside = ("fps", "image_size", "label", "held")
-    keys = [key for key in arrays.files if key.rpartition("/")[2] not in beside]
-    return [key.removesuffix("/keypoints") for key in keys]
+    whole = {key.removesuffix("/keypoints") for key in arrays.files if key.endswith("/keypoints")}
+    names = []
+    for key in arrays.files:
+        base, _, last = key.rpartition("/")
+        if last == "keypoints" and base:
+            names.append(base)
+        elif base not in whole and last not in _BESIDE:
+            names.append(key)
+    return names
 
 
 def _find(path: Path, arrays: Any, name: str) -> str:

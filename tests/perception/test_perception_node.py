@@ -144,10 +144,11 @@ def test_a_silent_camera_is_said_again_and_again_until_it_comes_back(body: Body)
 
     silent = bench.run(node, 1.0)
     assert len(silent) >= 5
+    assert silent[0].reason == "no frame from feed for 0.2 s"
     for message in silent:
         assert not message.valid
         assert 0 <= message.stamp_ns - last_ns < NS / 30  # the newest frame, not the newest tick
-        assert message.reason.startswith("no frame from feed for 0.")
+        assert message.reason.startswith("no frame from feed for ")
     assert "no frame from feed" in bench.inbox.read(bench.clock.now_ns()).fault
     status = node.status(bench.clock.now_ns())
     assert status.level == 2

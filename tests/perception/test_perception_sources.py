@@ -31,6 +31,7 @@ def npz(tmp_path: Path, body: Body) -> Path:
         "walk/keypoints": walk[:12],
         "walk/fps": np.float32(12.5),
         "walk/image_size": np.array([640, 480]),
+        "walk/onset": np.array(7),
         "activity06/movenet": walk,
         "activity06/fps": np.array(11.6),
         "bare": walk,
@@ -104,7 +105,7 @@ def test_what_the_file_lacks_comes_from_the_config(npz: Path) -> None:
 def test_clip_names_leave_out_what_lies_beside(npz: Path) -> None:
     names = clip_names(npz)
     assert {"walk", "bare", "fall-01/alphapose", "activity06/movenet"} <= set(names)
-    assert not [name for name in names if name.endswith(("fps", "label", "image_size"))]
+    assert not [name for name in names if name.endswith(("fps", "label", "image_size", "onset"))]
 
 
 def test_the_only_clip_needs_no_name(tmp_path: Path, body: Body) -> None:
