@@ -17,7 +17,7 @@ class QualityConfig(Section):
     measured_share_zero: float = Field(default=0.35, ge=0, lt=1)
     """Share at and below which the quality is 0."""
     strangeness_full: float = Field(default=1.0, gt=0, le=10)
-    """Distance from the training poses up to which a pose counts as seen; about one training pose in 100 is beyond 1."""
+    """Distance from the training poses up to which a pose counts as seen; about one of those in 100 is beyond 1."""
     strangeness_zero: float = Field(default=3.0, gt=0, le=100)
     """Distance at and beyond which the quality is 0."""
     several_people: float = Field(default=0.6, ge=0, le=1)
