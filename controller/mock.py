@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 from collections import deque
@@ -105,6 +106,8 @@ class LoggingController:
                 self._lines += 1
             except OSError as error:
                 self.fault = f"{self._path}: no longer written: {error.strerror}"
+                with contextlib.suppress(OSError):
+                    self._file.close()
                 self._file = None
 
 

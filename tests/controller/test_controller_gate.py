@@ -493,6 +493,11 @@ class TestFollowing:
         steps = next(k for k, x in enumerate(path) if x > 1.0 - 1e-4)
         assert 0.50 <= steps * 0.01 <= 0.60
 
+    def test_winds_down_at_the_jerk_limit_exactly(self) -> None:
+        """The rate chosen, wound down at J, closes exactly the gap: x dt + x^2 / (2 J) = 0.05 m/s."""
+        _, x = follow_velocity(0.0, 1.6, 0.05, 0.0, 0.01, self.LIMITS)
+        assert x * 0.01 + x * x / (2 * 40.0) == pytest.approx(0.05)
+
     def test_mirror(self) -> None:
         right = self.settle(0.3, 0.1, 0.9)
         left = self.settle(-0.3, -0.1, -0.9)

@@ -21,7 +21,7 @@ def profile(present: float, asked: np.ndarray, elapsed_s: float = 0.01, rates: R
     return stiffening_profile(present, asked, elapsed_s, STAGE_S, rates)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(levels, asked_profiles, st.floats(0.0, 0.5), rates)
 def test_bounded_and_rate_limited(present: float, asked: np.ndarray, elapsed_s: float, rates: Rates) -> None:
     s = profile(present, asked, elapsed_s, rates)
@@ -32,7 +32,7 @@ def test_bounded_and_rate_limited(present: float, asked: np.ndarray, elapsed_s: 
     assert (steps >= -rates.release * STAGE_S - 1e-12).all()
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(levels, asked_profiles, st.integers(0, STAGES - 1), levels)
 def test_asking_for_more_never_gives_less(present: float, asked: np.ndarray, stage: int, more: float) -> None:
     raised = asked.copy()

@@ -32,22 +32,22 @@ def total(distance: float = 5.0, rate: float = 0.0, fall: float = 0.0, config: I
 
 
 class TestMonotone:
-    @settings(max_examples=200, deadline=None)
+    @settings(max_examples=60, deadline=None)
     @given(distances, distances, rates, probabilities)
     def test_nearer_is_never_less(self, a: float, b: float, rate: float, fall: float) -> None:
         assert total(min(a, b), rate, fall) >= total(max(a, b), rate, fall)
 
-    @settings(max_examples=200, deadline=None)
+    @settings(max_examples=60, deadline=None)
     @given(distances, rates, rates, probabilities)
     def test_faster_closing_is_never_less(self, distance: float, a: float, b: float, fall: float) -> None:
         assert total(distance, min(a, b), fall) >= total(distance, max(a, b), fall)
 
-    @settings(max_examples=200, deadline=None)
+    @settings(max_examples=60, deadline=None)
     @given(distances, rates, probabilities, probabilities)
     def test_more_probable_is_never_less(self, distance: float, rate: float, a: float, b: float) -> None:
         assert total(distance, rate, max(a, b)) >= total(distance, rate, min(a, b))
 
-    @settings(max_examples=200, deadline=None)
+    @settings(max_examples=60, deadline=None)
     @given(distances, rates, probabilities)
     def test_within_zero_and_one(self, distance: float, rate: float, fall: float) -> None:
         assert 0.0 <= total(distance, rate, fall) <= 1.0

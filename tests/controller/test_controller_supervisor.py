@@ -283,7 +283,7 @@ ALLOWED = {
 }
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.lists(st.tuples(evidences, st.sampled_from([1, 10, 33, 400, 2000])), max_size=60))
 def test_only_the_drawn_arrows(sequence: list[tuple[Evidence, int]]) -> None:
     status, now_ns = Status(), NS
