@@ -163,7 +163,8 @@ class Up:
             self.seen.append(record)
             if condition(record):
                 return record
-        raise AssertionError(f"never seen; exit code {self.process.poll()}, last {self.seen[-3:]}")
+        code, errors = self.stop()
+        raise AssertionError(f"never seen; exit code {code}, stderr {errors!r}, last {self.seen[-3:]}")
 
     def end(self) -> tuple[int, str]:
         """Wait for the end; return exit code and what stderr said."""
@@ -183,14 +184,18 @@ class Up:
     def __enter__(self) -> Up:
         return self
 
+    def stop(self) -> tuple[int, str]:
+        """Make an end of it, if need be by force."""
+        self.process.send_signal(signal.SIGTERM)
+        try:
+            return self.end()
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            return self.end()
+
     def __exit__(self, *error: object) -> None:
         if self.process.poll() is None:
-            self.process.send_signal(signal.SIGTERM)
-            try:
-                self.end()
-            except subprocess.TimeoutExpired:
-                os.killpg(self.process.pid, signal.SIGKILL)
-                self.end()
+            self.stop()
 
 
 def free_ports(count: int) -> list[int]:
