@@ -135,7 +135,7 @@ def _draw_skeleton(axes: Any, points: Floats, links: Any, colour: str, width: fl
 def _half_size(skeletons: Sequence[Floats]) -> float:
     """Half of the window's width that holds every skeleton [px]."""
     spans = [np.nanmax(p, axis=0) - np.nanmin(p, axis=0) for p in skeletons if np.isfinite(p).any()]
-    return 0.5 * max((float(span.max()) for span in spans), default=2.0) * 1.12
+    return 0.56 * max([2.0, *(float(span.max()) for span in spans)])
 
 
 def _centre(shot: Snapshot) -> Floats:

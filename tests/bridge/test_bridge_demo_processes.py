@@ -1,0 +1,63 @@
+"""`surefoot demo` with real processes: toy nodes on the real wire."""
+
+from __future__ import annotations
+
+import csv
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from bridge_toys import PATIENCE_S, ROLES, Stage
+
+pytestmark = pytest.mark.processes
+
+
+@pytest.fixture
+def stage(tmp_path: Path) -> Stage:
+    return Stage(tmp_path)
+
+
+def start(stage: Stage, *arguments: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "bridge.cli", "demo", "--config", str(stage.config), "--out", "out", *arguments]
+    return subprocess.Popen(
+        command, env=stage.environment(), cwd=stage.folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+
+
+def modules(stage: Stage, **other: str) -> None:
+    stage.write_config(modules={role: other.get(role, f"toy_{role}") for role in ROLES})
+
+
+def test_it_ends_by_itself_and_leaves_picture_and_numbers(stage: Stage) -> None:
+    shown, errors = (process := start(stage, "--seconds", "1")).communicate(timeout=PATIENCE_S)
+    assert (process.returncode, errors) == (0, "")
+    assert "FOLLOW" in shown
+    assert "timeline.png" in shown.splitlines()[-1]
+    assert sorted(path.name for path in (stage.folder / "out").iterdir()) == ["logs", "timeline.csv", "timeline.png"]
+    with (stage.folder / "out" / "timeline.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert {row["stiffening"] for row in rows[5:-5]} == {"0.25"}
+    assert {row["fall"] for row in rows} == {"nan"}  # the toys forecast nothing
+    assert stage.left() == []
+
+
+def test_a_process_that_dies_is_named_in_one_line(stage: Stage) -> None:
+    (stage.folder / "bad_drive.py").write_text("import os, sys\nprint('fell over', file=sys.stderr)\nos._exit(3)\n")
+    modules(stage, drive="bad_drive")
+    process = start(stage)
+    _, errors = process.communicate(timeout=PATIENCE_S)
+    assert (process.returncode, errors) == (2, "surefoot: drive died with exit code 3: fell over\n")
+    assert stage.left() == []
+
+
+def test_ctrl_c_stops_everything(stage: Stage) -> None:
+    process = start(stage)
+    assert process.stdout is not None
+    while "FOLLOW" not in process.stdout.readline():
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 0
+    assert stage.left() == []
