@@ -47,6 +47,7 @@ class Status(NamedTuple):
     reason: str = "waiting for inputs"
     entered_ns: int = 0
     since: Since = Since()
+    in_fall: bool = False  # an arrest is going on, or a stop came in the middle of one
 
 
 def advance(status: Status, evidence: Evidence, now_ns: int, config: SupervisorConfig) -> Status:
@@ -56,8 +57,9 @@ def advance(status: Status, evidence: Evidence, now_ns: int, config: SupervisorC
     transition = _RULES[status.state](moment)
     if transition is None:
         return status._replace(since=since)
-    entered_ns = status.entered_ns if transition.state is status.state else now_ns
-    return Status(transition.state, transition.reason, entered_ns, since)
+    state, reason = transition
+    in_fall = state is GaitState.ARREST or (state is GaitState.SAFE_STOP and status.in_fall)
+    return Status(state, reason, status.entered_ns if state is status.state else now_ns, since, in_fall)
 
 
 class _Transition(NamedTuple):
@@ -106,7 +108,7 @@ def _from_disarmed(m: _Moment) -> _Transition | None:
 
 def _from_safe_stop(m: _Moment) -> _Transition | None:
     if m.evidence.fault:
-        return _Transition(GaitState.SAFE_STOP, m.evidence.fault)
+        return _safe_stop(m)
     if m.config.auto_rearm and m.lasted(m.since.good, m.config.rearm_dwell_s):
         return _Transition(GaitState.RECOVER, f"all inputs good for {m.config.rearm_dwell_s * 1e3:.0f} ms")
     return None
@@ -114,8 +116,7 @@ def _from_safe_stop(m: _Moment) -> _Transition | None:
 
 def _from_arrest(m: _Moment) -> _Transition | None:
     if m.evidence.fault:
-        words = f"{m.evidence.fault}; a fall was in progress, the support stays stiff"
-        return _Transition(GaitState.SAFE_STOP, words)
+        return _safe_stop(m)
     if m.lasted(m.since.settled, m.config.arrest_hold_s):
         words = f"risk, load and descent low for {m.config.arrest_hold_s * 1e3:.0f} ms"
         return _Transition(GaitState.RECOVER, words)
@@ -144,10 +145,15 @@ def _from_recover(m: _Moment) -> _Transition | None:
     return urgent
 
 
+def _safe_stop(m: _Moment) -> _Transition:
+    falling = "; a fall was in progress, the support stays stiff" if m.status.in_fall else ""
+    return _Transition(GaitState.SAFE_STOP, m.evidence.fault + falling)
+
+
 def _stop_or_arrest(m: _Moment) -> _Transition | None:
     """What comes before everything else while moving; load and descent do not wait for vision."""
     if m.evidence.fault:
-        return _Transition(GaitState.SAFE_STOP, m.evidence.fault)
+        return _safe_stop(m)
     if m.lasted(m.since.loaded, m.config.trigger_dwell_s):
         words = f"harness load {m.evidence.load_n:.0f} N, limit {m.config.harness_load_arrest_n:.0f}"
         return _Transition(GaitState.ARREST, words)

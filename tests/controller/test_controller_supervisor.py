@@ -110,7 +110,7 @@ AFTER = {
 
 def at(state: GaitState, now_ns: int = NS) -> Status:
     """Return a status that has just been entered; conditions begin to be timed with the next evidence."""
-    return Status(state, "entered", now_ns)
+    return Status(state, "entered", now_ns, in_fall=state is ARREST)
 
 
 def after(state: GaitState, evidence: Evidence, span_s: float, config: SupervisorConfig = CONFIG) -> Status:
@@ -254,6 +254,15 @@ class TestReasons:
         later = advance(status, EVENTS["risk between the thresholds"], NS + 20 * NS, CONFIG)
         assert (later.state, later.reason) == (GUARD, "ahead words")
         assert later.entered_ns == status.entered_ns
+
+    def test_a_stop_remembers_the_fall_it_came_in(self) -> None:
+        status = after(FOLLOW, EVENTS["harness load"], LONG_S)
+        for k in range(3):
+            status = advance(status, EVENTS["input lost"], NS + (20 + k) * NS, CONFIG)
+            assert status.reason.endswith("a fall was in progress, the support stays stiff")
+        status = advance(status, CALM, NS + 30 * NS, CONFIG)
+        status = advance(status, CALM, NS + 31 * NS, CONFIG)
+        assert (status.state, status.in_fall) == (RECOVER, False)
 
     def test_a_stop_names_what_is_wrong_now(self) -> None:
         status = advance(at(SAFE_STOP), EVENTS["input lost"], NS, CONFIG)
