@@ -68,13 +68,14 @@ def test_mock_records_a_fall_seen_coming_and_the_safe_stop(stage: Stage, clip: s
         assert age_s <= CONFIG.supervisor.horizon_age_limit_s, "never asked to act on an old frame"
     last = records[-1]
     assert (last["call"], last["state"]) == ("stop", "SAFE_STOP")
-    assert "fall_horizon" in last["reason"]
+    assert "horizon" in last["reason"]
 
 
 def check_order(records: list[dict[str, Any]]) -> None:
     for earlier, later in pairwise(records):
         assert earlier["now_ns"] < later["now_ns"]
-        assert earlier["rests_on_ns"] <= later["rests_on_ns"]
+    for earlier, later in pairwise(record for record in records if record["call"] == "step"):
+        assert 0 < earlier["rests_on_ns"] <= later["rests_on_ns"]
 
 
 def test_real_controller_moves_on_solved_problems_and_stops_when_blind(stage: Stage, clip: str) -> None:
