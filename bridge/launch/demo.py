@@ -145,7 +145,7 @@ def _moments(rows: Sequence[Row], summary: Summary) -> list[float]:
     if summary.onset_s is None:
         return [end_s * share for share in np.linspace(0.05, 0.95, 8)]
     onset_s, down_s = summary.onset_s, summary.lying_s or end_s
-    walking = [row for row in rows if 1.0 < row.time_s < onset_s - 1.0 and not np.isnan(row.distance_ahead)]
+    walking = [row for row in rows if 2.5 < row.time_s < onset_s - 0.5 and not np.isnan(row.distance_ahead)]
     nearest_s = min(walking, key=lambda row: row.distance_ahead).time_s if walking else 0.5 * onset_s
     falling = np.linspace(onset_s, down_s, 5).tolist()
     return [time_s for time_s in sorted({2.0, nearest_s, *falling, min(down_s + 1.0, end_s)}) if time_s <= end_s]

@@ -193,7 +193,8 @@ def _draw_probabilities(axes: Any, columns: dict[str, Any]) -> None:
         axes.plot(columns["time_s"], columns[name], color=colour, linewidth=1.5, label=f"{name}")
         axes.plot(columns["time_s"], columns[f"{name}_ahead"], color=colour, linewidth=1.4, linestyle=(0, (2.2, 1.4)))
     axes.plot([], [], color=INK, linewidth=1.4, linestyle=(0, (2.2, 1.4)), label="in 500 ms")
-    axes.set_ylim(-0.03, 1.06)
+    axes.set_ylim(-0.03, 1.30)
+    axes.set_yticks([0.0, 0.25, 0.5, 0.75, 1.0])
     axes.set_ylabel("probability", fontsize=10)
     _legend(axes, columns=4)
 
@@ -212,6 +213,7 @@ def _draw_distance(axes: Any, columns: dict[str, Any], thresholds: InterventionC
         axes.annotate(text, (1.005, value), xycoords=("axes fraction", "data"), fontsize=8, color=colour, va="center")
     axes.axhline(0.0, color=FAINT, linewidth=0.8, linestyle=":")
     axes.set_ylabel("distance to fall\nboundary [sd]", fontsize=10)
+    _leave_room(axes)
     _legend(axes, columns=2)
 
 
@@ -239,6 +241,7 @@ def _draw_motion(axes: Any, columns: dict[str, Any]) -> None:
     axes.plot(columns["time_s"], columns["velocity_x"], color=INK, linewidth=1.1, label="base, measured")
     axes.axhline(0.0, color=FAINT, linewidth=0.8, linestyle=":")
     axes.set_ylabel("velocity x\n[m/s]", fontsize=10)
+    _leave_room(axes)
     twin = _twin(axes, height)
     twin.plot(columns["time_s"], columns["height"], color=height, linewidth=1.4)
     twin.set_ylabel("column\nheight [m]", fontsize=10, color=height)
@@ -262,6 +265,12 @@ def _twin(axes: Any, colour: str) -> Any:
 def _top(values: Floats) -> float:
     known = values[np.isfinite(values)]
     return max(float(known.max()) * 1.08, 1.0) if len(known) else 1.0
+
+
+def _leave_room(axes: Any) -> None:
+    """Widen the range upwards, for the legend."""
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.22 * (high - low))
 
 
 def _legend(axes: Any, columns: int) -> None:
