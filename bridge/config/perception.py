@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from bridge.config.section import Section
 
@@ -59,8 +59,8 @@ class SourceConfig(Section):
 
     uri: str = ""
     """`FILE.npz:CLIP[/ARRAY]`, a video file, a folder of images, `camera:N` or a URL; "" = not set."""
-    crop_px: tuple[int, int, int, int] | None = None
-    """Part of each image that is used: x, y, width, height; not set = the whole image."""
+    crop_px: tuple[int, ...] = ()
+    """Part of each image that is used: x, y, width, height; [] = the whole image."""
     paced: bool = True
     """Files are played in real time; false: as fast as they can be processed, which no reader on the wire accepts."""
     fps_hz: float = Field(default=30.0, ge=1, le=240)
@@ -69,6 +69,13 @@ class SourceConfig(Section):
     """Image width of keypoint files that carry none."""
     image_height_px: int = Field(default=240, ge=16, le=16384)
     """Image height of keypoint files that carry none."""
+
+    @field_validator("crop_px")
+    @classmethod
+    def _check_crop(cls, crop: tuple[int, ...]) -> tuple[int, ...]:
+        if crop and (len(crop) != 4 or min(crop[:2]) < 0 or min(crop[2:]) <= 0):
+            raise ValueError("expected x, y >= 0 and width, height > 0, or [] for the whole image")
+        return crop
 
 
 class MovenetConfig(Section):

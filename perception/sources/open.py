@@ -12,7 +12,6 @@ from perception.sources.camera import open_camera
 from perception.sources.frame import Source
 from perception.sources.image_folder import open_folder
 from perception.sources.keypoint_file import read_clip, stills
-from perception.sources.picture import check_crop
 from perception.sources.playback import Playback
 from perception.sources.video_file import open_video
 
@@ -34,7 +33,10 @@ def open_source(spec: str, config: SourceConfig, clock: Clock) -> Source:
         SourceError: one line saying what is wrong with it.
         MissingExtraError: images are to be read and OpenCV is not installed.
     """
-    crop = None if config.crop_px is None else check_crop(config.crop_px)
+    crop = None
+    if config.crop_px:
+        x, y, width, height = config.crop_px
+        crop = (x, y, width, height)
     if not spec:
         raise SourceError(f"no source given: set --source or perception.source.uri to {_FORMS}")
     if (npz := _NPZ.match(spec)) is not None:

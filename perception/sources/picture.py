@@ -16,24 +16,15 @@ def parse_crop(text: str) -> Crop:
     """Read `x,y,width,height` [px].
 
     Raises:
-        SourceError: not four integers, or without extent.
+        SourceError: not four integers, a negative origin, or no extent.
     """
     try:
         x, y, width, height = (int(part) for part in text.split(","))
     except ValueError as error:
         raise SourceError(f"crop '{text}': expected X,Y,WIDTH,HEIGHT in whole pixels") from error
-    return check_crop((x, y, width, height))
-
-
-def check_crop(crop: Crop) -> Crop:
-    """Return `crop` if it can be a part of an image.
-
-    Raises:
-        SourceError: negative origin or no extent.
-    """
-    if crop[0] < 0 or crop[1] < 0 or crop[2] <= 0 or crop[3] <= 0:
-        raise SourceError(f"crop {_said(crop)}: expected X, Y >= 0 and WIDTH, HEIGHT > 0")
-    return crop
+    if x < 0 or y < 0 or width <= 0 or height <= 0:
+        raise SourceError(f"crop '{text}': expected X, Y >= 0 and WIDTH, HEIGHT > 0")
+    return x, y, width, height
 
 
 def to_rgb(bgr: Any, crop: Crop | None, name: str) -> Image:
@@ -45,11 +36,6 @@ def to_rgb(bgr: Any, crop: Crop | None, name: str) -> Image:
     height, width = bgr.shape[:2]
     x, y, used_width, used_height = crop or (0, 0, width, height)
     if x + used_width > width or y + used_height > height:
-        raise SourceError(
-            f"{name}: crop {_said((x, y, used_width, used_height))} reaches outside the {width}x{height} image"
-        )
+        said = f"{x},{y},{used_width},{used_height}"
+        raise SourceError(f"{name}: crop {said} reaches outside the {width}x{height} image")
     return np.ascontiguousarray(bgr[y : y + used_height, x : x + used_width, ::-1])
-
-
-def _said(crop: Crop) -> str:
-    return ",".join(str(value) for value in crop)

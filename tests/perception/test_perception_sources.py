@@ -12,7 +12,7 @@ from perception.extras import load_opencv
 from perception.sources.frame import Frame, Source
 from perception.sources.keypoint_file import clip_names, read_clip
 from perception.sources.open import open_source
-from perception.sources.picture import check_crop, parse_crop
+from perception.sources.picture import parse_crop
 
 Floats = NDArray[np.float64]
 Body = Callable[..., Floats]
@@ -260,8 +260,9 @@ def test_crops_are_parsed_and_checked() -> None:
     for text in ("1,2,3", "a,b,c,d", "", "1,2,3,4,5", "-1,0,10,10", "0,0,0,10"):
         with pytest.raises(SourceError, match="expected"):
             parse_crop(text)
-    with pytest.raises(SourceError, match="expected X, Y >= 0"):
-        check_crop((0, -1, 5, 5))
+    for crop in ((0, -1, 5, 5), (0, 0, 5), (0, 0, 5, 0)):
+        with pytest.raises(ValueError, match="expected x, y >= 0 and width, height > 0"):
+            SourceConfig(crop_px=crop)
 
 
 def test_a_missing_extra_is_named(video: Path, monkeypatch: pytest.MonkeyPatch) -> None:
