@@ -1,0 +1,197 @@
+"""Training and evaluation, on people made of twelve points that stand, fall over and lie."""
+
+import json
+
+import numpy as np
+import pytest
+import torch
+import typer
+from typer.testing import CliRunner
+
+from anticipation import checkpoint
+from anticipation.gait_state import DirectedGraphNetwork
+from anticipation.motion import HORIZON, WINDOW, DctMlpForecaster, zero_velocity
+from anticipation.training import fitting
+from anticipation.training.augmentation import augment
+from anticipation.training.clips import Clip
+from anticipation.training.commands import evaluate, train
+from anticipation.training.measures import calibration_error, score, temperatures
+from anticipation.training.samples import clean, cut
+from bridge.config.perception import CleaningConfig
+from bridge.errors import SurefootError
+
+BODY_M = np.array(
+    [
+        [0.2, 1.45], [-0.2, 1.45], [0.25, 1.15], [-0.25, 1.15], [0.27, 0.9], [-0.27, 0.9],
+        [0.12, 0.95], [-0.12, 0.95], [0.12, 0.5], [-0.12, 0.5], [0.13, 0.08], [-0.13, 0.08],
+    ]
+)  # fmt: skip
+STAND, GOING, LYING = 30, 30, 30
+
+
+def falling(seed, fps=30.0, scale=100.0):
+    """Keypoints (N, 12, 3) and labels -1, 0, 1 of someone who topples sideways."""
+    rng = np.random.default_rng(seed)
+    stand = round((STAND + rng.integers(-5, 6)) * fps / 30)
+    frames = stand + round((GOING + LYING) * fps / 30)
+    tilt = np.clip((np.arange(frames) - stand) / (GOING * fps / 30), 0, 1) ** 1.5 * np.pi / 2 * rng.choice([-1, 1])
+    turn = np.stack([np.cos(tilt), np.sin(tilt), -np.sin(tilt), np.cos(tilt)], axis=1).reshape(-1, 2, 2)
+    points = np.einsum("nij,kj->nki", turn, BODY_M) * [scale, -scale] + [160, 200]
+    points += rng.normal(size=points.shape) * 0.5
+    labels = np.full(frames, -1)
+    labels[stand:] = 0
+    labels[stand + round(GOING * fps / 30) :] = 1
+    return np.concatenate([points, np.full((frames, 12, 1), 0.9)], axis=-1), labels
+
+
+def walking(seed, frames=80):
+    """Someone walking, (T, 12, 3) [m], z up."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(frames) / 30
+    points = np.zeros((frames, 12, 3))
+    points[:, :, 1] = BODY_M[:, 0]
+    points[:, :, 2] = BODY_M[:, 1]
+    swing = 0.25 * np.sin(2 * np.pi * time + rng.uniform(0, 6))
+    for joint, gain in ((4, -1), (5, 1), (10, 1), (11, -1), (8, 0.5), (9, -0.5)):
+        points[:, joint, 0] += gain * swing
+    points[:, :, 0] += rng.uniform(0.8, 1.3) * time[:, None]
+    return points
+
+
+@pytest.fixture(scope="module")
+def made_data(tmp_path_factory):
+    """A folder laid out like the research data."""
+    folder = tmp_path_factory.mktemp("data")
+    for name in ("urfd", "upfall", "mocap"):
+        (folder / name).mkdir()
+    falls = {}
+    for number in range(8):
+        keypoints, labels = falling(number)
+        falls[f"fall-{number:02d}/alphapose"] = falls[f"fall-{number:02d}/movenet"] = keypoints
+        falls[f"fall-{number:02d}/label"] = labels
+    np.savez(folder / "urfd" / "falls.npz", **falls)
+    still, _ = falling(99)
+    np.savez(folder / "urfd" / "adls.npz", **{"adl-40/movenet": still[:25], "adl-40/label": np.full(20, -1)})
+    clips = {}
+    for activity in range(1, 12):
+        keypoints, labels = falling(activity, fps=14.0, scale=200.0)
+        if activity > 5:
+            keypoints, labels = np.concatenate([keypoints[:12]] * 4), np.full(48, -1)
+        name = f"activity{activity:02d}-trial1-cam1"
+        clips |= {f"{name}/movenet": keypoints, f"{name}/label": labels, f"{name}/fps": np.array(14.0)}
+    np.savez(folder / "upfall" / "subject1_cam1.npz", **clips)
+    np.savez(folder / "mocap" / "cmu.npz", **{f"00{i}_01": walking(i) for i in range(3)})
+    bandai = {f"dataset-1_{kind}_normal_00{i}": walking(i + 9) for kind in ("walk", "wave") for i in range(3)}
+    np.savez(folder / "mocap" / "bandai_namco.npz", **bandai)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def samples():
+    tracks = []
+    for seed in range(5):
+        keypoints, labels = falling(seed)
+        clip = Clip(f"fall-{seed}", str(seed), keypoints, 30.0, labels + 1, 320, 240, "made", "none")
+        tracks.append(clean(clip, CleaningConfig()))
+    return cut(tracks)
+
+
+def fit(network, samples, seed=0, forecast=None):
+    losses = []
+    recipe = fitting.Recipe(epochs=3, draws=128, batch=32, rate=3e-3, seed=seed)
+    if isinstance(network, DirectedGraphNetwork):
+        fitting.fit_classifier(network, [(samples, 1.0)], recipe, forecast, losses.append)
+    else:
+        fitting.fit_forecaster(network, [(samples, 1.0)], recipe, losses.append)
+    return losses
+
+
+@pytest.mark.parametrize("kind", [DirectedGraphNetwork, DctMlpForecaster])
+def test_training_repeats_for_a_seed_and_lowers_the_loss(kind, samples):
+    runs = []
+    for seed in (0, 0, 1):
+        torch.manual_seed(7)
+        network = kind()
+        losses = fit(network, samples, seed, zero_velocity)
+        assert losses[-1] < losses[0]
+        assert not network.training
+        runs.append(torch.cat([value.flatten() for value in network.state_dict().values()]))
+    assert torch.equal(runs[0], runs[1])
+    assert not torch.equal(runs[0], runs[2])
+
+
+def test_augmentation_keeps_shape_and_changes_whole_samples_alike():
+    poses = torch.randn(1, 1, 12, 2).expand(64, WINDOW + HORIZON, 12, 2).contiguous()
+    changed = augment(poses, torch.Generator().manual_seed(0))
+    assert changed.shape == poses.shape
+    assert torch.isfinite(changed).all()
+    within = changed.std(dim=1).median()
+    between = changed.mean(dim=1).std(dim=0).median()
+    assert within < 0.1 < between
+
+
+def test_scores_of_a_perfect_and_of_a_blind_prediction(samples):
+    perfect = np.maximum(samples.labels, 0)
+    assert np.allclose(score(perfect, samples).accuracy, 1)
+    assert np.allclose(score(perfect, samples).macro_f1, 1)
+    blind = score(np.zeros_like(perfect), samples)
+    assert (blind.accuracy < 0.6).all()
+    assert (blind.macro_f1 < 0.35).all()
+
+
+def test_temperature_undoes_overconfidence():
+    rng = np.random.default_rng(0)
+    logits = rng.normal(size=(6000, 1, 3)) * 1.5
+    chance = np.exp(logits[:, 0]) / np.exp(logits[:, 0]).sum(axis=1, keepdims=True)
+    labels = (rng.random((6000, 1)) > chance.cumsum(axis=1)).sum(axis=1)[:, None]
+    found = temperatures(logits * 2.5, labels)
+    assert abs(found[0] - 2.5) < 0.3
+    assert calibration_error(chance, labels[:, 0]) < 0.03
+
+
+def commands():
+    app = typer.Typer()
+    app.command()(train)
+    app.command()(evaluate)
+    return app
+
+
+def test_evaluate_prints_and_writes_what_beats_chance(made_data, tmp_path):
+    out = tmp_path / "report" / "numbers.json"
+    options = ["evaluate", "--data", str(made_data), "--quick", "--folds", "2", "--json", str(out)]
+    result = CliRunner().invoke(commands(), options, catch_exceptions=False)
+    assert result.exit_code == 0
+    assert "majority class" in result.output
+    numbers = json.loads(out.read_text())
+    shipped = np.mean(numbers["accuracy"][numbers["shipped"]], axis=0)
+    majority = np.mean(numbers["accuracy"]["majority class"], axis=0)
+    assert shipped[0] > majority[0] + 0.1
+    assert len(numbers["temperature"]) == HORIZON + 1
+    assert numbers["tested_frames"] > 0
+    assert len(numbers["accuracy"][numbers["shipped"]]) == 2
+
+
+def test_train_writes_a_checkpoint_that_loads(made_data, tmp_path):
+    out = tmp_path / "weights.safetensors"
+    options = ["train", "--data", str(made_data), "--quick", "--folds", "2", "--out", str(out)]
+    result = CliRunner().invoke(commands(), options, catch_exceptions=False)
+    assert result.exit_code == 0
+    loaded = checkpoint.load(out)
+    assert "non-commercial" in loaded.provenance.licence
+    assert (loaded.temperature > 0).all()
+
+
+@pytest.mark.parametrize("command", [train, evaluate])
+def test_incomplete_data_is_one_line(command, tmp_path):
+    with pytest.raises(SurefootError) as failure:
+        command(data=tmp_path, quick=True)
+    assert "\n" not in str(failure.value)
+    assert "SUREFOOT_DATA" in str(failure.value)
+
+
+def test_an_evaluation_that_is_none_is_refused_before_training(made_data, tmp_path):
+    wrong = tmp_path / "wrong.json"
+    wrong.write_text("{}")
+    with pytest.raises(SurefootError, match=r"wrong\.json"):
+        train(data=made_data, evaluated=wrong, quick=True, out=tmp_path / "x.safetensors")
+    assert not (tmp_path / "x.safetensors").exists()
