@@ -45,7 +45,7 @@ class SupervisorConfig(Section):
     harness_load_release_n: float = Field(default=150.0, ge=0, le=5000)
     """Downward pull below which an arrest may end [N]."""
 
-    descent_arrest_m_s: float = Field(default=0.25, gt=0, le=5)
+    descent_arrest_m_s: float = Field(default=0.30, gt=0, le=5)
     """Downward speed of the support column that is a fall, whatever vision says [m/s]."""
 
     descent_release_m_s: float = Field(default=0.05, ge=0, le=5)

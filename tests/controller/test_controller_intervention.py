@@ -143,7 +143,7 @@ class TestWithoutVision:
     def test_descent(self) -> None:
         person = Person()
         person.run(1.0, walking)
-        assert person.run(0.1, walking, descent=0.4).reason == "column descends at 0.40 m/s, limit 0.25"
+        assert person.run(0.1, walking, descent=0.4).reason == "column descends at 0.40 m/s, limit 0.30"
 
 
 class TestLoss:

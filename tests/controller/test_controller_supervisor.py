@@ -42,7 +42,7 @@ EVENTS = {
     "risk near, not critical": CALM._replace(risk_near=0.5, risk_ahead=0.5),
     "harness load": CALM._replace(load_n=400.0),
     "leaning": CALM._replace(load_n=200.0),
-    "descent": CALM._replace(descent_m_s=0.3),
+    "descent": CALM._replace(descent_m_s=0.4),
     "slow descent": CALM._replace(descent_m_s=0.1),
     "load and input lost": CALM._replace(fault="odometry is 61 ms old, limit 60", load_n=400.0),
 }
@@ -233,7 +233,7 @@ class TestReasons:
             (FOLLOW, "risk ahead", "ahead words"),
             (FOLLOW, "fall near", "near words"),
             (GUARD, "harness load", "harness load 400 N, limit 300"),
-            (GUARD, "descent", "column descends at 0.30 m/s, limit 0.25"),
+            (GUARD, "descent", "column descends at 0.40 m/s, limit 0.30"),
             (GUARD, "calm", "risk below 0.1 for 500 ms"),
             (ARREST, "calm", "risk, load and descent low for 1000 ms"),
             (
