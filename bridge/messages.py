@@ -6,6 +6,7 @@ value and limit when a message must not be acted on; it never repairs anything.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import IntEnum, StrEnum
 from typing import Protocol, TypeAlias
@@ -50,7 +51,7 @@ def frozen(array: object, shape: tuple[int, ...], name: str) -> Floats:
         InvalidMessage: the size does not fit.
     """
     value = np.array(array, dtype=np.float64)
-    if value.size != int(np.prod(shape)):
+    if value.size != math.prod(shape):
         raise InvalidMessage(f"{name} has shape {value.shape}, expected {shape}")
     value = value.reshape(shape)
     value.flags.writeable = False
