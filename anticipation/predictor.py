@@ -7,11 +7,11 @@ from typing import Final, Self
 
 import numpy as np
 import torch
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from anticipation.checkpoint import Checkpoint, load
-from anticipation.inference import FastDirectedGraph, fast_forecast
+from anticipation.fast_gait_state import FastDirectedGraph
+from anticipation.fast_motion import fast_forecast
 from anticipation.motion import BASELINES, COORDINATES, HORIZON, WINDOW
 from anticipation.quality import Quality, judge
 from anticipation.window import PoseWindow
@@ -104,12 +104,12 @@ class Predictor:
             self._frames[0, :WINDOW] = torch.from_numpy(window)
             self._frames[:, WINDOW:] = self._forecast(self._frames[:, :WINDOW])
             judgement = self._classify(self._frames)
-        frames = self._frames[0].numpy().astype(np.float64)
-        if self._plane.features == "embedding":
-            features = judgement.embedding.numpy().astype(np.float64)
-        else:  # every window is a stretch of the flattened frames
-            features = sliding_window_view(frames.reshape(-1), WINDOW * COORDINATES)[::COORDINATES]
-        return frames, judgement.logits.numpy().astype(np.float64), features
+            if self._plane.features == "embedding":
+                features = judgement.embedding
+            else:  # every window is a stretch of the flattened frames
+                features = self._frames.flatten().unfold(0, WINDOW * COORDINATES, COORDINATES)
+            frames, logits = self._frames[0], judgement.logits
+            return frames.double().numpy(), logits.double().numpy(), features.double().numpy()
 
     def _probabilities(self, logits: Floats, quality: Quality) -> Floats:
         """Calibrated probabilities (16, 3).

@@ -9,7 +9,7 @@ so the fall region is the intersection of two half-planes and the signed distanc
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, Literal, NamedTuple, Self, TypeAlias, get_args
 
 import numpy as np
@@ -32,6 +32,14 @@ class Transition(NamedTuple):
     centre_distance: Floats  # (S, 3) distance to each class centre [sd]
 
 
+class _Wedge(NamedTuple):
+    """The fall region: what lies inside of two lines."""
+
+    normals: Floats  # (2, 2) unit normals, pointing out
+    offsets: Floats  # (2,) inside is normal @ point <= offset
+    corner: Floats  # (2,) where the lines meet
+
+
 @dataclass(frozen=True)
 class TransientPlane:
     """An affine map to the plane, three class centres and three linear scores.
@@ -46,6 +54,7 @@ class TransientPlane:
     centres: Floats  # (3, 2) [sd]
     weights: Floats  # (3, 2) class scores are weights @ point + biases; the largest wins
     biases: Floats  # (3,)
+    _wedge: _Wedge = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.features not in get_args(Features):
@@ -59,8 +68,11 @@ class TransientPlane:
                 raise ValueError(f"plane {name} is not finite")
             array.flags.writeable = False
             object.__setattr__(self, name, array)
-        if abs(np.linalg.det(self._fall_normals()[0])) < 1e-9:
+        normals, offsets = self._fall_normals()
+        if abs(np.linalg.det(normals)) < 1e-9:
             raise ValueError("plane has parallel class boundaries: the three classes do not spread over it")
+        corner = np.linalg.solve(normals, offsets).astype(np.float64)
+        object.__setattr__(self, "_wedge", _Wedge(normals, offsets, corner))
 
     @classmethod
     def fit(cls, features: NDArray[np.floating], labels: NDArray[np.integer], kind: Features) -> Self:
@@ -123,13 +135,13 @@ class TransientPlane:
         Inside, the nearer of the two lines counts. Outside, the nearest point of the region is the foot on one
         of the lines where that foot belongs to the region, and else the corner where the lines meet.
         """
-        normals, offsets = self._fall_normals()
+        normals, offsets, corner = self._wedge
         beyond = points @ normals.T - offsets  # (S, 2) signed distance to each line, positive outside
         feet = points[:, None] - beyond[..., None] * normals  # (S, 2, 2)
         across = feet @ normals.T - offsets  # (S, foot, line)
         kept = np.stack((across[:, 0, 1], across[:, 1, 0]), axis=1) <= 0
-        corner = np.linalg.norm(points - np.linalg.solve(normals, offsets), axis=1)
-        outside = np.minimum(np.where(kept, np.abs(beyond), np.inf).min(axis=1), corner)
+        to_corner = np.hypot(points[:, 0] - corner[0], points[:, 1] - corner[1])
+        outside = np.minimum(np.where(kept, np.abs(beyond), np.inf).min(axis=1), to_corner)
         deepest = beyond.max(axis=1)
         distance: Floats = np.where(deepest <= 0, deepest, outside).clip(-REACH, REACH)
         return distance
@@ -142,11 +154,12 @@ class TransientPlane:
         closing = (distance > 0) & (rate < 0)
         time_left = np.where(distance > 0, np.inf, 0.0)
         np.divide(distance, -rate, out=time_left, where=closing)
-        centre_distance = np.linalg.norm(points[:, None] - self.centres, axis=2)
+        away = points[:, None] - self.centres  # (S, 3, 2)
+        centre_distance = np.hypot(away[..., 0], away[..., 1])
         return Transition(points, distance, rate, time_left, centre_distance)
 
     def _fall_normals(self) -> tuple[Floats, Floats]:
-        """Unit normals (2, 2) and offsets (2,) of the lines that bound the fall region: inside is n @ p <= o."""
+        """Unit normals (2, 2) and offsets (2,) of the lines between the fall region and the other two."""
         others = [k for k in range(len(CLASSES)) if k != FALL]
         normals = self.weights[others] - self.weights[FALL]
         length = np.linalg.norm(normals, axis=1)

@@ -1,9 +1,8 @@
-"""The networks as a running node uses them: one window at a time, the same numbers with less work.
+"""The classifier as a running node uses it: one sequence at a time, the same numbers with less work.
 
-At batch size one the arithmetic is small and the calls are many, so here batch norms are folded into the
-layers before them, vertices and edges share one batched product, and the recurrent layer is a plain
-matrix-vector product per step. Tests hold each class equal to the module it was made from. The classes keep
-copies: later changes of a module do not reach them.
+At batch size one the arithmetic is small and the calls are many, so batch norms are folded into the layers before
+them, shortcut and convolution are one product, and vertices and edges share it. A test holds the numbers equal to
+those of the module.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ import torch
 from torch import Tensor, nn
 
 from anticipation.gait_state import ChannelNorm, DirectedGraphBlock, DirectedGraphNetwork, Stream, incidence
-from anticipation.motion import COORDINATES, HORIZON, Forecast, LstmForecaster
 
 
 class Judgement(NamedTuple):
@@ -24,13 +22,10 @@ class Judgement(NamedTuple):
     logits: Tensor  # (T - 14, 3)
 
 
-def fast_forecast(forecaster: Forecast) -> Forecast:
-    """Return a quicker equal of `forecaster` for windows (1, 15, 12, 2), or itself if there is none."""
-    return FastLstm(forecaster) if isinstance(forecaster, LstmForecaster) else forecaster
-
-
 class FastDirectedGraph:
     """`DirectedGraphNetwork` in evaluation mode for one sequence: (1, T, 12, C) -> `Judgement`.
+
+    It keeps copies of the weights: later training does not reach it.
 
     Vertices and edges, twelve of each, are the two entries of the first axis of X (2, 12, T, C).
     """
@@ -43,8 +38,7 @@ class FastDirectedGraph:
             self._scale = torch.stack([scale for scale, _ in norms])[:, None, None]  # (2, 1, 1, C)
             self._shift = torch.stack([shift for _, shift in norms])[:, None, None]
             self._blocks = [_FastBlock(cast(DirectedGraphBlock, block)) for block in network.blocks]
-            self._head = network.head.weight.T.clone()
-            self._bias = network.head.bias.clone()
+            self._bias, self._head = network.head.bias.clone(), network.head.weight.T.contiguous()
 
     def __call__(self, frames: Tensor) -> Judgement:
         """Judge every window of frames (1, T, 12, C)."""
@@ -91,75 +85,6 @@ class _FastBlock:
         first, second = (graph @ neighbours.flatten(1)).view(2, *neighbours.shape).unbind()
         entered = torch.cat((own, first, second), dim=-1).flatten(0, 1)
         torch.addmm(bias, entered, weight, out=out.view(-1, out.shape[-1])).relu_()
-
-
-class FastLstm:
-    """`LstmForecaster` in evaluation mode for one window: (1, 15, 12, 2) -> (1, 15, 12, 2).
-
-    Matrix-vector products instead of the general recurrent kernels, whose set-up costs more than a step;
-    a layer's input products are taken for the whole window at once.
-    """
-
-    def __init__(self, network: LstmForecaster) -> None:
-        hidden = network.lstm.hidden_size
-        # torch orders the gates input, forget, cell, output; with the cell last, one sigmoid serves the other three
-        order = torch.cat([torch.arange(hidden) + k * hidden for k in (0, 1, 3, 2)])
-        with torch.no_grad():
-            self._layers = [
-                _Layer(
-                    getattr(network.lstm, f"weight_ih_l{k}")[order],
-                    getattr(network.lstm, f"weight_hh_l{k}")[order],
-                    (getattr(network.lstm, f"bias_ih_l{k}") + getattr(network.lstm, f"bias_hh_l{k}"))[order],
-                )
-                for k in range(network.lstm.num_layers)
-            ]
-            self._head = network.head.weight.clone()
-            self._bias = network.head.bias.clone()
-        self._hidden = hidden
-        self._rollout = network.mode == "rollout"
-        self._residual = network.residual
-
-    def __call__(self, window: Tensor) -> Tensor:
-        """Forecast (1, 15, 12, 2) from a window (1, 15, 12, 2)."""
-        poses = window.reshape(-1, COORDINATES)  # (15, 24)
-        state = [(window.new_zeros(self._hidden), window.new_zeros(self._hidden)) for _ in self._layers]
-        hidden = self._advance(poses, state)
-        last = poses[-1]
-        if not self._rollout:
-            future = torch.addmv(self._bias, self._head, hidden).view(HORIZON, COORDINATES)
-            return (future + last if self._residual else future).view(window.shape)
-        futures = []
-        for step in range(HORIZON):
-            if step:
-                hidden = self._advance(last[None], state)
-            pose = torch.addmv(self._bias, self._head, hidden)
-            last = last + pose if self._residual else pose
-            futures.append(last)
-        return torch.stack(futures).view(window.shape)
-
-    def _advance(self, inputs: Tensor, state: list[tuple[Tensor, Tensor]]) -> Tensor:
-        """Feed inputs (S, 24), update `state` in place and return the last layer's newest hidden vector."""
-        for k, layer in enumerate(self._layers):
-            entering = torch.addmm(layer.bias, inputs, layer.weight_input.T)  # (S, 4 hidden)
-            hidden, cell = state[k]
-            outputs = []
-            for gates in entering:
-                gates = torch.addmv(gates, layer.weight_hidden, hidden)  # noqa: PLW2901 (the same gates, complete)
-                enter, forget, leave = gates[: 3 * self._hidden].sigmoid_().view(3, self._hidden)
-                cell = torch.addcmul(forget * cell, enter, gates[3 * self._hidden :].tanh_())
-                hidden = leave * cell.tanh()
-                outputs.append(hidden)
-            state[k] = (hidden, cell)
-            inputs = torch.stack(outputs)
-        return inputs[-1]
-
-
-class _Layer(NamedTuple):
-    """One recurrent layer, gates in the order input, forget, output, cell."""
-
-    weight_input: Tensor  # (4 hidden, entering)
-    weight_hidden: Tensor  # (4 hidden, hidden)
-    bias: Tensor  # (4 hidden,)
 
 
 def _affine(norm: ChannelNorm) -> tuple[Tensor, Tensor]:
