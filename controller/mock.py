@@ -21,7 +21,7 @@ class LoggingController:
 
     Every call becomes a record in `records`, and one line of JSON in the log file, flushed at once
     so that it can be read while this runs. Both are bounded: `records` keeps the newest; a full
-    file is renamed to `FILE.1`, in place of an older one, and a new file begun.
+    file, and one that an earlier run left, is renamed to `FILE.1`, in place of an older one, and a new file begun.
     """
 
     def __init__(self, log: str = "", max_records: int = 100_000) -> None:
@@ -39,7 +39,7 @@ class LoggingController:
         self._column_height: float | None = None
         if self._path is not None:
             try:
-                self._file = self._path.open("w", encoding="utf-8")
+                self._file = self._begin(self._path)
             except OSError as error:
                 raise ConfigError(f"controller.log = {log}: cannot be written: {error.strerror}") from error
 
@@ -80,6 +80,12 @@ class LoggingController:
             self._file.close()
             self._file = None
 
+    def _begin(self, path: Path) -> TextIO:
+        if path.is_file() and path.stat().st_size > 0:
+            path.replace(path.with_name(path.name + ".1"))
+        self._lines = 0
+        return path.open("w", encoding="utf-8")
+
     def _record(self, call: str, now_ns: int, decision: Decision, measured: dict[str, list[float]]) -> None:
         record = {
             "call": call,
@@ -98,9 +104,7 @@ class LoggingController:
             try:
                 if self._lines >= self._max_records:
                     self._file.close()
-                    self._path.replace(self._path.with_name(self._path.name + ".1"))
-                    self._file = self._path.open("w", encoding="utf-8")
-                    self._lines = 0
+                    self._file = self._begin(self._path)
                 self._file.write(json.dumps(record) + "\n")
                 self._file.flush()
                 self._lines += 1

@@ -85,6 +85,17 @@ def test_file_is_bounded(tmp_path: Path) -> None:
     assert len(list(tmp_path.iterdir())) == 2
 
 
+def test_log_of_the_run_before_is_kept(tmp_path: Path) -> None:
+    """A controller that was killed and started again does not wipe what led to it."""
+    file = tmp_path / "calls.jsonl"
+    for k in range(2):
+        mock = LoggingController(str(file))
+        mock.step(NS + k, odometry(), wrench(), decision())
+        mock.close()
+    assert json.loads(file.read_text())["now_ns"] == NS + 1
+    assert json.loads((tmp_path / "calls.jsonl.1").read_text())["now_ns"] == NS
+
+
 def test_file_that_cannot_be_written_is_said_at_once(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"controller.log = .*nowhere.*: cannot be written: No such file"):
         LoggingController(str(tmp_path / "nowhere" / "calls.jsonl"))
