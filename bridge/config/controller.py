@@ -25,4 +25,4 @@ class ControllerConfig(Section):
     """File of the logging mock (JSON lines); "" = keep the records in memory only."""
 
     log_records: int = Field(default=100_000, ge=10, le=10_000_000)
-    """Records the mock keeps: in memory the newest; a full or an old file is renamed to `FILE.1` and a new one begun."""
+    """Records the mock keeps: in memory the newest; a full or old file is renamed to `FILE.1`, a new one begun."""
