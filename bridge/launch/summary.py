@@ -29,7 +29,7 @@ class Summary(NamedTuple):
 
     onset_s: float | None  # the recording's own label: balance is lost
     lying_s: float | None
-    stiffening_s: float | None  # first of the episode that met the fall
+    stiffening_s: float | None  # start of the episode that lasted until the body lay, else of the last before
     stiff_s: float | None  # nearly full
     guard_s: float | None
     arrest_s: float | None
@@ -54,7 +54,9 @@ def summarise(rows: Sequence[Row], onset_s: float | None, lying_s: float | None)
     if onset_s is None:
         return Summary(None, None, None, None, None, None, tuple(episodes))
     before = tuple(episode for episode in episodes if episode.end_s < onset_s)
-    met = next((episode for episode in episodes if episode.end_s >= onset_s), None)
+    during = [episode for episode in episodes if episode.end_s >= onset_s]
+    met = next((episode for episode in during if lying_s is None or episode.end_s >= lying_s), None)
+    met = met or (during[-1] if during else None)
     if met is None:
         return Summary(onset_s, lying_s, None, None, None, None, before)
     since = [row for row in rows if row.time_s >= met.start_s]

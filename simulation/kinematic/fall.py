@@ -47,8 +47,8 @@ class Fall:
 
     at_s: float
     direction_rad: float  # 0 forward, pi/2 to the left, pi backward
-    length_m: float = 1.0  # of the pendulum
-    push_rad_s: float = 0.9
+    length_m: float = 1.15  # of the pendulum: two thirds of the body height, as for a rod
+    push_rad_s: float = 0.7
     buckle: float = 1.0  # 0: the legs stay as they were; 1: as in most falls
 
     def pace(self, time_s: Floats) -> Floats:

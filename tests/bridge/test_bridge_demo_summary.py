@@ -60,6 +60,12 @@ def test_a_walker_that_was_late_is_called_late():
     assert "after the body lay" in " ".join(sentences(summary, np.array([])))
 
 
+def test_a_twitch_that_passed_is_not_the_answer_to_the_fall():
+    states = [(0.0, "FOLLOW")] * 11 + [(0.1, "FOLLOW")] + [(0.0, "FOLLOW")] * 3 + [(1.0, "ARREST")] * 6
+    summary = summarise(rows_of(*states), 1.0, 1.8)
+    assert summary.stiffening_s == pytest.approx(1.5)
+
+
 def test_unknown_stiffening_is_no_episode():
     assert summarise(rows_of(*[(float("nan"), "")] * 10), None, None).before == ()
 
