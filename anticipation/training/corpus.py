@@ -82,10 +82,7 @@ def people_folds(corpus: Corpus, folds: int, seed: int) -> list[tuple[Indices, I
 
 
 def shares(corpus: Corpus, chosen: Sequence[Track]) -> Shares:
-    """Weigh the sources: half of a batch are URFD falls, a quarter UP-Fall falls, the rest people who do not fall.
-
-    Falls tracked by AlphaPose weigh twice those by MoveNet, whose confidence in them is low.
-    """
+    """Weigh the sources: most of a batch are URFD falls, tracked by AlphaPose more than by the less certain MoveNet."""
     names = {track.name for track in chosen}
 
     def some(tracks: Sequence[Track], stride: int = 1) -> Samples:
@@ -97,7 +94,7 @@ def shares(corpus: Corpus, chosen: Sequence[Track]) -> Shares:
     staged, daily = some(corpus.staged), some(corpus.daily, DAILY_STRIDE)
     walks = cut(corpus.walks, MOCAP_STRIDE)
     motion = [(alphapose, 0.4), (movenet, 0.2), (staged, 0.15), (daily, 0.05), (walks, 0.2)]
-    gait = [(alphapose, 0.4), (movenet, 0.2), (staged, 0.2), (daily, 0.1), (walks, 0.1)]
+    gait = [(alphapose, 0.55), (movenet, 0.2), (staged, 0.1), (daily, 0.1), (walks, 0.05)]
     return Shares(_there(motion), _there(gait), walks)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
+from torch.optim.swa_utils import AveragedModel
 
 from anticipation.gait_state import DirectedGraphNetwork
 from anticipation.motion import HORIZON, WINDOW, Forecast
@@ -26,6 +27,7 @@ from anticipation.training.shifted import ShiftedNetwork
 DECAY_EVERY: Final = 16  # epochs (paper, III.B)
 DECAY: Final = 0.3
 SMOOTH_L1_AT: Final = 0.05  # where the loss turns from square to absolute [body lengths]
+AVERAGED: Final = 0.4  # the last share of the epochs whose weights are averaged
 GRAPH_FROZEN: Final = 4  # epochs before the incidence may learn (Shi et al. 2019 freeze it at first)
 
 
@@ -146,12 +148,17 @@ def _descend(
     progress: Progress,
     thaw: Callable[[bool], None] | None = None,
 ) -> None:
-    """Run Adam with step decay; leave the network in evaluation mode."""
+    """Run Adam with step decay; leave the mean of the last epochs' weights in the network, in evaluation mode.
+
+    The mean lies where the loss is flat (Izmailov et al., "Averaging Weights Leads to Wider Optima and Better
+    Generalization", UAI 2018): with 20 falls to learn from, one epoch's weights are a draw.
+    """
     generator = torch.Generator().manual_seed(recipe.seed)
     torch.manual_seed(recipe.seed)  # dropout draws from the global generator
     optimizer = torch.optim.Adam(network.parameters(), lr=recipe.rate)
     schedule = torch.optim.lr_scheduler.StepLR(optimizer, DECAY_EVERY, DECAY)
     network.train()
+    averaged = AveragedModel(network, use_buffers=True)
     for epoch in range(recipe.epochs):
         if thaw is not None and epoch == GRAPH_FROZEN:
             thaw(True)
@@ -164,7 +171,10 @@ def _descend(
             optimizer.step()
             losses.append(loss.item())
         schedule.step()
+        if epoch >= (1.0 - AVERAGED) * recipe.epochs:
+            averaged.update_parameters(network)
         progress(float(np.mean(losses)))
+    network.load_state_dict(averaged.module.state_dict())
     network.eval()
 
 

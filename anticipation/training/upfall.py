@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from anticipation.training.clips import UNLABELLED, Clip, load_arrays, required
+from anticipation.training.clips import FALL, TRANSIENT, UNLABELLED, Clip, Labels, load_arrays, required
 from bridge.messages import Floats
 
 LICENCE: Final = "research use"
@@ -16,15 +16,17 @@ HEIGHT: Final = 640
 FALLS: Final = range(1, 6)
 LYING_DOWN: Final = 11
 LYING_TILT: Final = np.radians(60.0)
+UPRIGHT_TILT: Final = np.radians(30.0)
+FALLING_S: Final = 1.0  # how long URFD calls a fall a fall
 
 
 def read(folder: Path) -> list[Clip]:
     """Read the 33 clips; the group is activity and trial.
 
-    The labels are those of the data set, with one exception. Activity 11 (lying down on
-    purpose) is labelled 'not lying' throughout, though the person lies: two windows that
-    look alike must not carry opposite labels, so its frames with the trunk more than
-    60 degrees from upright carry none.
+    The labels are those of the data set, but for frames that contradict URFD's, which carry none:
+    'falling' more than a second before the first lying frame (URFD's falling is the last second, UP-Fall's takes up to
+    2.7 s), 'lying' with the trunk within 30 degrees of upright (the person has risen, or the estimator
+    has lost them), and 'not lying' with the trunk beyond 60 degrees while lying down on purpose (activity 11).
 
     Raises:
         SourceError: the file is missing or damaged.
@@ -35,13 +37,21 @@ def read(folder: Path) -> list[Clip]:
         name, _, kind = key.partition("/")
         if kind != "movenet":
             continue
-        labels = arrays[f"{name}/label"].astype(np.int64) + 1
-        if activity(name) == LYING_DOWN:
-            labels = np.where(trunk_tilt(arrays[key]) > LYING_TILT, UNLABELLED, labels)
-        group = "upfall/" + name.rpartition("-")[0]
         fps = float(arrays[f"{name}/fps"])
+        labels = _consistent(arrays[f"{name}/label"].astype(np.int64) + 1, trunk_tilt(arrays[key]), fps, name)
+        group = "upfall/" + name.rpartition("-")[0]
         clips.append(Clip(name, group, arrays[key], fps, labels, WIDTH, HEIGHT, "UP-Fall", LICENCE))
     return clips
+
+
+def _consistent(labels: Labels, tilt: Floats, fps: float, name: str) -> Labels:
+    """Take the labels from frames that would contradict URFD's."""
+    index = np.arange(len(labels))
+    first_lying = int(np.argmax(labels == FALL)) if (labels == FALL).any() else len(labels)
+    early = (labels == TRANSIENT) & (index < first_lying - FALLING_S * fps)
+    upright = (labels == FALL) & (tilt < UPRIGHT_TILT)
+    on_purpose = (tilt > LYING_TILT) & (activity(name) == LYING_DOWN)
+    return np.where(early | upright | on_purpose, UNLABELLED, labels)
 
 
 def activity(name: str) -> int:

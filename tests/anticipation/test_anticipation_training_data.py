@@ -188,6 +188,33 @@ def test_labels_must_fit_the_frames():
         standing(10, 30.0, np.zeros(9, dtype=np.int64))
 
 
+def test_upfall_frames_that_contradict_the_other_labels_carry_none(tmp_path):
+    from anticipation.training import upfall
+
+    fps, frames = 10.0, 60
+    tilt = np.zeros(frames)
+    tilt[30:50] = np.pi / 2  # lies from 30 to 50, stands afterwards
+    turn = np.stack([np.cos(tilt), -np.sin(tilt), np.sin(tilt), np.cos(tilt)], axis=1).reshape(-1, 2, 2)
+    points = np.einsum("nij,kj->nki", turn, STANDING) + 300
+    keypoints = np.concatenate([points, np.full((frames, 12, 1), 0.9)], axis=-1)
+    given = np.r_[np.full(5, -1), np.zeros(25), np.ones(30)]
+    folder = tmp_path / "upfall"
+    folder.mkdir()
+    arrays = {}
+    for activity, labels in ((1, given), (11, np.full(frames, -1))):
+        name = f"activity{activity:02d}-trial1-cam1"
+        arrays |= {f"{name}/movenet": keypoints, f"{name}/label": labels, f"{name}/fps": np.array(fps)}
+    np.savez(folder / "subject1_cam1.npz", **arrays)
+    fall, on_purpose = upfall.read(tmp_path)
+    assert (fall.labels[:5] == STABLE).all()
+    assert (fall.labels[5:20] == UNLABELLED).all()  # more than a second before lying
+    assert (fall.labels[20:30] == TRANSIENT).all()
+    assert (fall.labels[30:50] == FALL).all()
+    assert (fall.labels[50:] == UNLABELLED).all()
+    assert (on_purpose.labels[30:50] == UNLABELLED).all()
+    assert (on_purpose.labels[:30] == STABLE).all()
+
+
 @pytest.mark.data
 def test_the_research_data_reads_as_described(data_dir):
     from anticipation.training import upfall, urfd
