@@ -14,6 +14,8 @@ from importlib import import_module
 from bridge.clock import ManualClock, nanoseconds
 from bridge.config.surefoot import SurefootConfig
 from bridge.node import Factory, Node, NodeContext
+from bridge.topics import Topic
+from bridge.transport.interface import Sample
 from bridge.transport.memory import MemoryHub
 
 
@@ -59,6 +61,15 @@ class LockStep:
         self.clock.sleep_until(when_ns)
         for node in self._event_driven:
             node.step(when_ns)
+
+    def deliver(self, topic: Topic, sample: Sample) -> None:
+        """Run the periodic nodes up to the arrival of `sample`, put it on the wire, then run the event-driven nodes."""
+        self._run_periodic_before(sample.arrival_ns)
+        self._now_ns = sample.arrival_ns
+        self.clock.sleep_until(sample.arrival_ns)
+        self.hub.deliver(topic, sample)
+        for node in self._event_driven:
+            node.step(sample.arrival_ns)
 
     def settle(self) -> None:
         """Let every periodic node take its next turn, so that what just happened reaches its output.

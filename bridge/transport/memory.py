@@ -28,6 +28,11 @@ class MemoryHub:
         """Return a new door to this hub."""
         return MemoryTransport(self)
 
+    def deliver(self, topic: Topic, sample: Sample) -> None:
+        """Hand `sample` to every subscriber of `topic`."""
+        for callback in tuple(self.subscribers[topic.key]):
+            callback(sample)
+
     def next_source(self) -> bytes:
         """Return an identifier no publisher of this hub had before."""
         return next(self._sources).to_bytes(16, "little")
@@ -56,7 +61,7 @@ class _Undo:
 
 class _MemoryPublisher:
     def __init__(self, hub: MemoryHub, topic: Topic) -> None:
-        self._hub, self._key, self._source, self._sequence = hub, topic.key, hub.next_source(), 0
+        self._hub, self._topic, self._source, self._sequence = hub, topic, hub.next_source(), 0
         self._open = True
 
     def put(self, payload: bytes, stamp_ns: int) -> None:  # noqa: ARG002 (the stamp travels inside the payload here)
@@ -64,8 +69,7 @@ class _MemoryPublisher:
             return
         sample = Sample(payload, self._sequence, self._source, self._hub.clock.now_ns())
         self._sequence += 1
-        for callback in tuple(self._hub.subscribers[self._key]):
-            callback(sample)
+        self._hub.deliver(self._topic, sample)
 
     def close(self) -> None:
         self._open = False

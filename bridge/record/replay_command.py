@@ -1,0 +1,193 @@
+"""`surefoot replay`: options, checks, and what is said."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import Progress
+
+from bridge.clock import SystemClock
+from bridge.config.load import load_config
+from bridge.config.surefoot import SurefootConfig
+from bridge.errors import ConfigError, SourceError
+from bridge.launch.watch import StopSignals
+from bridge.record.feed import Processes, feed
+from bridge.record.meter import Meter
+from bridge.record.offline import replay_offline
+from bridge.record.online import Pace, Played, StandIns, play
+from bridge.record.options import (
+    ConfigOption,
+    FileArgument,
+    OutOption,
+    OverwriteOption,
+    SetOption,
+    TopicsOption,
+    config_path,
+)
+from bridge.record.reader import Recording
+from bridge.record.roles import INPUTS, outputs, parse_roles, parse_topics
+from bridge.record.writer import BagWriter, RecordingError
+from bridge.topics import TOPICS, Topic
+
+
+def replay(
+    file: FileArgument,
+    only: Annotated[
+        str | None, typer.Option(metavar="ROLE,...", help="Run these roles and feed them what they read.")
+    ] = None,
+    rate: Annotated[float, typer.Option(min=0.01, max=100, metavar="X", help="Speed; 1 is real time.")] = 1.0,
+    as_fast_as_possible: Annotated[
+        bool, typer.Option("--as-fast-as-possible", help="With --only: in simulated time, the same result every time.")
+    ] = False,
+    out: OutOption = None,
+    overwrite: OverwriteOption = False,
+    topics: TopicsOption = None,
+    delay: Annotated[float, typer.Option(min=0, metavar="S", help="Let readers connect for so long [s].")] = 1.0,
+    config: ConfigOption = None,
+    set_: SetOption = None,
+    option: Annotated[
+        list[str] | None,
+        typer.Option(metavar="[ROLE.]NAME=VALUE", help="Option of a role, such as controller=log; repeatable."),
+    ] = None,
+) -> int:
+    """Replay a recording: the whole of it on the wire of this machine, or to one process with --only.
+
+    Without --only the recorded messages are published with their stamps moved to now, in the place
+    of the processes that published them; none of these may be running. With --only ROLE that process
+    is started and fed what it reads; what it publishes goes to --out.
+    """
+    recording = Recording(file)
+    path = config_path(config)
+    loaded = load_config(path, set_ or [])
+    if only is None:
+        _refuse("--out", out is not None, "goes with --only: without a process there is nothing to write")
+        _refuse("--as-fast-as-possible", as_fast_as_possible, "goes with --only: live processes know real time alone")
+        _refuse("--option", bool(option), "goes with --only")
+        _replay_all(recording, loaded, topics, Pace(rate, delay))
+        return 0
+    _refuse("--topics", topics is not None, "goes without --only: a role is fed all it reads")
+    _refuse("--rate", as_fast_as_possible and rate != 1.0, "does not go with --as-fast-as-possible")
+    roles = parse_roles(only)
+    processes = Processes(roles, loaded, path, set_ or [], _role_options(option or [], roles))
+    writer = _writer(recording, out, processes, overwrite=overwrite)
+    try:
+        if as_fast_as_possible:
+            _run_offline(recording, processes, writer)
+        else:
+            _run_processes(recording, processes, Pace(rate, delay), writer)
+    except BaseException:
+        if writer is not None:
+            writer.discard()
+        raise
+    return 0
+
+
+def _replay_all(recording: Recording, config: SurefootConfig, topics: str | None, pace: Pace) -> None:
+    listened = [topic for topic in TOPICS if topic.key in recording.listened]
+    wanted: Sequence[Topic] = parse_topics(topics) if topics is not None else listened or TOPICS
+    roles = {topic.publisher for topic in wanted} - {"*"}
+    clock = SystemClock()
+    with StandIns(config.bridge, roles or INPUTS, clock) as stand_ins, _Watch(recording) as watch:
+        played = play(recording, wanted, stand_ins, pace, clock, watch)
+    _say_played(recording, played)
+
+
+def _run_offline(recording: Recording, processes: Processes, writer: BagWriter | None) -> None:
+    with Progress(console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(" and ".join(processes.roles), total=1.0)
+        result = replay_offline(
+            recording,
+            processes.roles,
+            processes.config,
+            processes.options,
+            _drop if writer is None else writer.write,
+            lambda done: progress.update(task, completed=done),
+        )
+    if writer is not None:
+        writer.finish()
+    typer.echo(f"{recording.path}: {result.simulated_s:.1f} s; {_counts('fed', result.fed)}", err=True)
+    typer.echo(_answered(result.answered, writer), err=True)
+    _say_damage(recording)
+
+
+def _run_processes(recording: Recording, processes: Processes, pace: Pace, writer: BagWriter | None) -> None:
+    with _Watch(recording) as watch:
+        played = feed(recording, processes, pace, writer, watch)
+    _say_played(recording, played)
+    if writer is not None:
+        typer.echo(f"{writer.out}: {writer.messages} messages", err=True)
+
+
+class _Watch:
+    """Says how far a replay is, and ends it when a signal comes."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._name, self._meter, self._signals = recording.path, Meter(), StopSignals()
+
+    def __enter__(self) -> _Watch:
+        self._signals.__enter__()
+        typer.echo(f"replaying {self._name}; Ctrl-C ends it", err=True)
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._meter.end()
+        self._signals.__exit__(*error)
+
+    def __call__(self, progress: float) -> bool:
+        if self._meter.due():
+            self._meter.show(f"{progress:4.0%}")
+        return self._signals.seen is not None
+
+
+def _writer(recording: Recording, out: Path | None, processes: Processes, *, overwrite: bool) -> BagWriter | None:
+    if out is None:
+        return None
+    if out.resolve() in {recording.path.resolve(), *(file.resolve() for file in recording.files)}:
+        raise RecordingError(f"--out {out}: is the recording that is replayed")
+    return BagWriter(out, processes.config.bridge.namespace, outputs(processes.roles), overwrite=overwrite)
+
+
+def _role_options(pairs: Sequence[str], roles: Sequence[str]) -> dict[str, dict[str, str]]:
+    options: dict[str, dict[str, str]] = {role: {} for role in roles}
+    for pair in pairs:
+        name, equals, value = pair.partition("=")
+        role, dot, rest = name.partition(".")
+        if not dot and len(roles) == 1:
+            role, rest = roles[0], name
+        if not equals or not rest or role not in options:
+            raise ConfigError(f"--option {pair}: expected ROLE.NAME=VALUE, ROLE one of {', '.join(roles)}")
+        options[role][rest] = value
+    return options
+
+
+def _refuse(name: str, given: bool, why: str) -> None:
+    if given:
+        raise ConfigError(f"{name} {why}")
+
+
+def _drop(_topic: Topic, _sample: object) -> None:
+    """Keep nothing."""
+
+
+def _say_played(recording: Recording, played: Played) -> None:
+    if not played.sent:
+        raise SourceError(f"{recording.path}: nothing to replay")
+    typer.echo(f"{_counts('sent', played.sent)}; at most {played.latest_s * 1e3:.0f} ms late", err=True)
+    _say_damage(recording)
+
+
+def _say_damage(recording: Recording) -> None:
+    if recording.damage:
+        typer.echo(f"{recording.path} is not whole: {recording.damage}", err=True)
+
+
+def _answered(counts: Mapping[str, int], writer: BagWriter | None) -> str:
+    return _counts("answered", counts) + (f", in {writer.out}" if writer is not None else "")
+
+
+def _counts(verb: str, counts: Mapping[str, int]) -> str:
+    return f"{verb} " + (", ".join(f"{count} {key}" for key, count in counts.items()) or "nothing")
