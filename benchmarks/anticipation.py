@@ -84,25 +84,29 @@ def timed(action: Callable[[], Any], times: int) -> list[float]:
     return took
 
 
-def step_durations(checkpoint: Checkpoint, frames: int) -> tuple[list[float], list[float]]:
-    """Durations of cleaning and of the whole step for each frame that completes a tick [ms]."""
+def step_durations(checkpoint: Checkpoint, frames: int) -> dict[str, list[float]]:
+    """Durations of cleaning and of the whole step, and the step's time on the core, for each frame [ms].
+
+    On a machine that does other work the time on the core is nearer to what an idle one would show.
+    """
     cleaner = Cleaner(CleaningConfig())
     predictor = Predictor(checkpoint, AnticipationConfig(min_quality=0.0))
     predictor.warm_up()
-    cleaning, whole = [], []
+    took: dict[str, list[float]] = {"cleaning": [], "whole step": [], "whole step, time on the core": []}
     for number, frame in enumerate(detections(frames)):
         stamp_ns = round((1 + number / 30) * NS)
-        start = time.perf_counter_ns()
+        start_on_core, start = time.thread_time_ns(), time.perf_counter_ns()
         ticks = cleaner.push(frame, stamp_ns)
         cleaned = time.perf_counter_ns()
         for tick in ticks:
             predictor.push(as_message(tick))
         horizon = predictor.predict()
-        end = time.perf_counter_ns()
+        end, end_on_core = time.perf_counter_ns(), time.thread_time_ns()
         if horizon is not None and horizon.valid and number > 60:
-            cleaning.append((cleaned - start) / 1e6)
-            whole.append((end - start) / 1e6)
-    return cleaning, whole
+            spans = (cleaned - start, end - start, end_on_core - start_on_core)
+            for name, span in zip(took, spans, strict=True):
+                took[name].append(span / 1e6)
+    return took
 
 
 def as_message(tick: CleanFrame) -> Keypoints:
@@ -126,13 +130,12 @@ def measure(checkpoint: Checkpoint, times: int) -> dict[str, Any]:
     )
     gc.collect()
     gc.freeze()
-    cleaning, whole = step_durations(checkpoint, times)
+    steps = step_durations(checkpoint, times)
     with torch.inference_mode():
         parts = {
-            "cleaning": cleaning,
+            **steps,
             "forecaster": timed(lambda: quick_forecast(window), times),
             "classifier, one pass": timed(lambda: quick_classifier(frames), times),
-            "whole step": whole,
             "classifier, one pass, eager": timed(lambda: classifier(frames), times),
             "classifier, 16 windows, eager": timed(lambda: classifier(windows), times),
             "LSTM direct": timed(lambda: quick_lstm(window), times // 4),
