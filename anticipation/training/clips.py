@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,14 +78,25 @@ def required(folder: Path, relative: str) -> Path:
     return path
 
 
-def load_arrays(path: Path) -> dict[str, NDArray[np.float64]]:
+class Arrays(dict[str, Floats]):
+    """The arrays of one file; asking for one that is not there names the file."""
+
+    def __init__(self, path: Path, arrays: dict[str, Floats]) -> None:
+        super().__init__(arrays)
+        self._path = path
+
+    def __missing__(self, name: str) -> Floats:
+        raise SourceError(f"research data '{self._path}' has no array '{name}'")
+
+
+def load_arrays(path: Path) -> Arrays:
     """Read the numeric arrays of an npz file, without pickle.
 
     Raises:
-        SourceError: the file is damaged.
+        SourceError: the file is damaged; later, when an array is asked for that is not in it.
     """
     try:
         with np.load(path, allow_pickle=False) as archive:
-            return {name: np.asarray(archive[name], dtype=np.float64) for name in archive.files}
-    except (OSError, ValueError, EOFError, KeyError) as error:
+            return Arrays(path, {name: np.asarray(archive[name], dtype=np.float64) for name in archive.files})
+    except (OSError, ValueError, EOFError, zlib.error, BadZipFile) as error:
         raise SourceError(f"research data '{path}' cannot be read: {error}") from error

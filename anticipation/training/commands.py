@@ -68,12 +68,12 @@ def train(
     """Fit the networks to every recording and write a checkpoint."""
     folder = data_folder(data)
     measured = None if evaluated is None else production.read_evaluation(evaluated)
+    _writable(out)
     plan = plan_for(forecaster.value, seed, quick, epochs)
     _one_thread()
     corpus = read_corpus(folder, plan.mocap_clips, seed, CleaningConfig())
     with progress_bars() as progress:
         made = production.make_checkpoint(corpus, plan, folds, seed, measured, progress)
-    _writable(out)
     checkpoint.save(made, out)
     Console().print(f"wrote {out} ({out.stat().st_size / 1e6:.1f} MB)")
 
@@ -91,6 +91,8 @@ def evaluate(
 ) -> None:
     """Print how well recordings are foreseen that no network has seen, beside simpler ways."""
     folder = data_folder(data)
+    if json_file is not None:
+        _writable(json_file)
     plan = plan_for(forecaster.value, seed, quick, epochs)
     _one_thread()
     corpus = read_corpus(folder, plan.mocap_clips, seed, CleaningConfig())
@@ -105,7 +107,6 @@ def evaluate(
             outcome = evaluation.paper(corpus, plan, seed, keypoints.value, progress)
     report.show(outcome, title, _console())
     if json_file is not None:
-        _writable(json_file)
         json_file.write_text(json.dumps(report.as_json(outcome, title, seed), indent=1) + "\n")
 
 
@@ -121,7 +122,7 @@ def _one_thread() -> None:
 
 
 def _writable(path: Path) -> None:
-    """Make the folder of an output file.
+    """Make the folder of an output file, before hours are spent on its content.
 
     Raises:
         SurefootError: it cannot be made, or the path is a folder.

@@ -14,6 +14,7 @@ from anticipation.training.clips import Clip
 from anticipation.training.samples import Samples, Track, clean, cut
 from anticipation.training.splits import Indices, grouped_folds
 from bridge.config.perception import CleaningConfig
+from bridge.errors import SourceError
 
 Tested = Literal["alphapose", "movenet", "both"]
 
@@ -71,10 +72,17 @@ def read_corpus(folder: Path, mocap_clips: int, seed: int, cleaning: CleaningCon
 
 
 def people_folds(corpus: Corpus, folds: int, seed: int) -> list[tuple[Indices, Indices]]:
-    """Divide `corpus.people` into folds by group, URFD falls and the rest each evenly."""
+    """Divide `corpus.people` into folds by group, URFD falls and the rest each evenly.
+
+    Raises:
+        SourceError: there are fewer recordings than folds.
+    """
     falls = len(corpus.falls)
-    first = grouped_folds([track.group for track in corpus.falls], folds, seed)
-    second = grouped_folds([track.group for track in corpus.people[falls:]], folds, seed)
+    try:
+        first = grouped_folds([track.group for track in corpus.falls], folds, seed)
+        second = grouped_folds([track.group for track in corpus.people[falls:]], folds, seed)
+    except ValueError as error:
+        raise SourceError(f"research data is too little: {error}") from error
     return [
         (np.concatenate([a, c + falls]), np.concatenate([b, d + falls]))
         for (a, b), (c, d) in zip(first, second, strict=True)

@@ -183,6 +183,19 @@ def test_missing_data_is_named(tmp_path, monkeypatch):
         data_folder(tmp_path / "nowhere")
 
 
+def test_damaged_data_is_named(tmp_path):
+    from anticipation.training.clips import load_arrays
+
+    whole = tmp_path / "whole.npz"
+    np.savez(whole, poses=np.zeros((50, 12, 3)))
+    with pytest.raises(SourceError, match="has no array 'label'"):
+        load_arrays(whole)["label"]
+    cut_off = tmp_path / "cut.npz"
+    cut_off.write_bytes(whole.read_bytes()[:200])
+    with pytest.raises(SourceError, match=r"cut\.npz"):
+        load_arrays(cut_off)
+
+
 def test_labels_must_fit_the_frames():
     with pytest.raises(SourceError, match="labels"):
         standing(10, 30.0, np.zeros(9, dtype=np.int64))
