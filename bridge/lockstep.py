@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from importlib import import_module
+from typing import Final
 
 from bridge.clock import ManualClock, nanoseconds
 from bridge.config.surefoot import SurefootConfig
@@ -18,6 +19,8 @@ from bridge.topics import Topic
 from bridge.transport.interface import Sample
 from bridge.transport.memory import MemoryHub
 
+NO_LIMIT_S: Final = 1e10  # what solvers take for no limit
+
 
 def load_factory(module: str) -> Factory:
     """Return the `create` function of a node module named by string."""
@@ -25,11 +28,16 @@ def load_factory(module: str) -> Factory:
     return factory
 
 
+def without_real_time(config: SurefootConfig) -> SurefootConfig:
+    """Return `config` without limits in real time: they would make the result depend on the machine's load."""
+    return config.model_copy(update={"mpc": config.mpc.model_copy(update={"time_limit_s": NO_LIMIT_S})})
+
+
 class LockStep:
     """Nodes on one in-memory wire.
 
     Args:
-        config: configuration every node gets.
+        config: configuration every node gets, without its limits in real time.
         nodes: role -> its module and options, in the order in which they are stepped within one instant.
         start_ns: simulated time at which everything starts [ns].
     """
@@ -37,6 +45,7 @@ class LockStep:
     def __init__(
         self, config: SurefootConfig, nodes: Mapping[str, tuple[str, Mapping[str, str]]], start_ns: int
     ) -> None:
+        config = without_real_time(config)
         self.clock = ManualClock(start_ns)
         self.hub = MemoryHub(self.clock)
         self._now_ns = start_ns
@@ -45,7 +54,11 @@ class LockStep:
         self._due_ns: list[int] = []
         for role, (module, options) in nodes.items():
             context = NodeContext(
-                config, self.hub.transport(), self.clock, logging.getLogger(f"lockstep.{role}"), options
+                without_real_time(config),
+                self.hub.transport(),
+                self.clock,
+                logging.getLogger(f"lockstep.{role}"),
+                options,
             )
             node = load_factory(module)(context)
             if node.period_s is None:

@@ -79,9 +79,8 @@ def replay_offline(
         if system is not None:
             system.close()
     if not fed:
-        raise SourceError(
-            f"{recording.path}: holds none of what {' and '.join(roles)} read: {', '.join(sorted(wanted))}"
-        )
+        readers, keys = " and ".join(roles), ", ".join(sorted(wanted))
+        raise SourceError(f"{recording.path}: holds nothing that is fed to {readers} ({keys})")
     return Replayed(fed, answered, seconds(last_ns - first_ns))
 
 

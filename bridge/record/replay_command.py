@@ -97,7 +97,8 @@ def _replay_all(recording: Recording, config: SurefootConfig, topics: str | None
 
 
 def _run_offline(recording: Recording, processes: Processes, writer: BagWriter | None) -> None:
-    with Progress(console=Console(stderr=True), transient=True) as progress:
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task(" and ".join(processes.roles), total=1.0)
         result = replay_offline(
             recording,

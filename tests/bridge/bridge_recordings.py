@@ -42,11 +42,17 @@ SOURCES = {
     for index, role in enumerate(("perception", "anticipation", "controller", "drive"), start=1)
 }
 DELAY_NS = 300_000  # from a message's stamp to its arrival
-STANDING = np.array(  # shoulders, elbows, wrists, hips, knees, ankles, left and right [px]
-    [[140, 80], [180, 80], [135, 115], [185, 115], [133, 145], [187, 145]]
-    + [[147, 150], [173, 150], [147, 190], [173, 190], [147, 228], [173, 228]],
+STANDING = np.array(  # [px]
+    [
+        [(140, 80), (180, 80)],  # shoulders, left and right
+        [(135, 115), (185, 115)],  # elbows
+        [(133, 145), (187, 145)],  # wrists
+        [(147, 150), (173, 150)],  # hips
+        [(147, 190), (173, 190)],  # knees
+        [(147, 228), (173, 228)],  # ankles
+    ],
     dtype=float,
-)
+).reshape(12, 2)
 
 
 class Event(NamedTuple):

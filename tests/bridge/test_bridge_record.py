@@ -11,6 +11,7 @@ from bridge_recordings import NAMESPACE, START_NS, Event, keypoints, walk, write
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from bridge.cli import main
 from bridge.clock import ManualClock
 from bridge.codec import encode
 from bridge.errors import ConfigError, SourceError
@@ -303,3 +304,39 @@ def test_what_a_role_makes_is_not_fed_to_the_next() -> None:
 def test_synthetic_messages_are_acceptable() -> None:
     for event in EVENTS:
         event.message.check()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [
+        (["--out", "taken.mcap"], "taken.mcap: the name is taken; --overwrite replaces it"),
+        (["--out", "nowhere/walk.mcap"], "no such folder: nowhere"),
+        (["--out", "walk.mcap", "--topics", "odometry"], "--topics odometry: no such topic"),
+        (["--out", "walk.mcap", "--set", "bridge.lease_ms=1"], "lease_ms"),
+    ],
+)
+def test_the_command_refuses_in_one_line(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    what: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("taken.mcap").write_text("somebody's")
+    assert main(["record", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert what in error
+    assert [path.name for path in tmp_path.iterdir()] == ["taken.mcap"]
+    assert Path("taken.mcap").read_text() == "somebody's"
+
+
+def test_the_command_ends_by_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["record", "--duration", "0", "--topics", "wrench", "--set", "bridge.endpoints={}"]) == 0
+    assert "0 messages" in capsys.readouterr().err
+    (out,) = (tmp_path / "runs").iterdir()
+    assert Recording(out).listened == ("wrench",)

@@ -1,0 +1,223 @@
+"""What Surefoot writes is read by parties that did not write it: other libraries, other definitions."""
+
+from __future__ import annotations
+
+import json
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import zenoh
+from bridge_idl import FallHorizonIdl, KeypointsIdl, SupportCommandIdl
+from bridge_recordings import START_NS, Event, command, horizon, keypoints, walk, write
+from bridge_toys import free_ports
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from bridge.clock import SystemClock
+from bridge.codec import TYPES as STORE
+from bridge.codec import encode
+from bridge.config.bridge import BridgeConfig
+from bridge.outbox import Outbox
+from bridge.record.layout import header_stamp_ns
+from bridge.record.reader import Recording
+from bridge.topics import FALL_HORIZON, KEYPOINTS, SUPPORT_COMMAND, TOPICS
+from bridge.transport.interface import Sample
+from bridge.transport.zenoh import ZenohTransport
+
+EVENTS = walk(1.5)
+COUNTS = {f"/surefoot/{topic.key}": sum(event.topic == topic for event in EVENTS) for topic in TOPICS}
+TYPES = {f"/surefoot/{topic.key}": topic.ros_type for topic in TOPICS}
+
+
+@pytest.fixture(scope="module", params=["walk.mcap", "walk"])
+def bag(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write(tmp_path_factory.mktemp("bag") / request.param, EVENTS)
+
+
+def first(topic: str) -> Event:
+    return next(event for event in EVENTS if f"/surefoot/{event.topic.key}" == topic)
+
+
+def check_values(topic: str, raw: Any) -> None:
+    """Compare the first message of a topic, as some library decoded it, with what was sent."""
+    event = first(topic)
+    sent: Any = event.message
+    if topic == "/surefoot/diagnostics":
+        assert raw.status[0].hardware_id == sent.role
+        assert [(pair.key, pair.value) for pair in raw.status[0].values] == list(sent.values.items())
+        return
+    assert raw.header.stamp.sec * 10**9 + raw.header.stamp.nanosec == sent.stamp_ns
+    assert raw.header.frame_id == sent.frame_id
+    match event.topic.key:
+        case "keypoints":
+            assert np.array_equal(np.reshape(raw.position_px, (12, 2)), sent.position_px)
+            assert list(raw.status) == sent.status.tolist()
+            assert (raw.image_width, raw.people, raw.body_length_px) == (320, 1, 150.0)
+        case "fall_horizon":
+            assert np.array_equal(np.reshape(raw.forecast_px, (16, 12, 2)), sent.forecast_px)
+            assert np.array_equal(np.reshape(raw.probabilities, (16, 3)), sent.probabilities)
+            assert np.isinf(np.asarray(raw.time_to_boundary)).all()
+        case "support_command":
+            assert (raw.state, raw.solver, raw.column_height) == ("FOLLOW", "mpc", 0.95)
+            assert raw.rests_on.sec * 10**9 + raw.rests_on.nanosec == sent.rests_on_ns
+            assert (raw.twist.linear.x, raw.twist.angular.z) == (0.4, 0.05)
+        case "cmd_vel":
+            assert (raw.twist.linear.x, raw.twist.angular.z) == (0.4, 0.05)
+        case "wrench":
+            assert (raw.wrench.force.x, raw.wrench.torque.z) == (sent.force[0], 0.3)
+        case "odom":
+            assert raw.child_frame_id == "support"
+            assert (raw.pose.pose.position.z, raw.twist.twist.linear.x) == (0.95, 0.4)
+
+
+def test_mcap_ros2_support_decodes_a_recording(bag: Path) -> None:
+    file = bag if bag.is_file() else bag / "walk_0.mcap"
+    seen: dict[str, int] = dict.fromkeys(COUNTS, 0)
+    with file.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        assert reader.get_header().profile == "ros2"
+        for schema, channel, message, decoded in reader.iter_decoded_messages():
+            assert schema is not None
+            assert (schema.encoding, schema.name) == ("ros2msg", TYPES[channel.topic])
+            assert channel.message_encoding == "cdr"
+            assert message.publish_time == message.log_time - 300_000
+            if not seen[channel.topic]:
+                check_values(channel.topic, decoded)
+            seen[channel.topic] += 1
+    assert seen == COUNTS
+
+
+def test_the_definitions_inside_keep_their_units(bag: Path) -> None:
+    file = bag if bag.is_file() else bag / "walk_0.mcap"
+    with file.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    texts = {schema.name: schema.data.decode() for schema in summary.schemas.values()}
+    assert "# slowly adapting body scale [px]" in texts["surefoot_msgs/msg/Keypoints"]
+    for text in texts.values():
+        assert "MSG: std_msgs/Header" in text
+        assert "MSG: builtin_interfaces/Time" in text
+
+
+def test_rosbags_reads_a_recording_with_the_definitions_inside(bag: Path) -> None:
+    seen: dict[str, int] = dict.fromkeys(COUNTS, 0)
+    with AnyReader([bag]) as reader:
+        assert reader.message_count == len(EVENTS)
+        assert reader.start_time == EVENTS[0].sample.arrival_ns
+        assert reader.end_time == EVENTS[-1].sample.arrival_ns + 1
+        assert {connection.topic: connection.msgtype for connection in reader.connections} == TYPES
+        for connection, arrival_ns, payload in reader.messages():
+            assert START_NS <= arrival_ns <= EVENTS[-1].sample.arrival_ns
+            if not seen[connection.topic]:
+                check_values(connection.topic, reader.deserialize(payload, connection.msgtype))
+            seen[connection.topic] += 1
+    assert seen == COUNTS
+
+
+EXAMPLES = [
+    ("keypoints", KEYPOINTS, KeypointsIdl, keypoints(START_NS, 7)),
+    ("fall_horizon", FALL_HORIZON, FallHorizonIdl, horizon(START_NS, 8)),
+    ("support_command", SUPPORT_COMMAND, SupportCommandIdl, command(START_NS, 9)),
+]
+
+
+@pytest.mark.parametrize(("key", "topic", "idl", "message"), EXAMPLES, ids=[example[0] for example in EXAMPLES])
+def test_pycdr2_decodes_the_bytes_on_the_wire(
+    key: str, topic: Any, idl: Any, message: Any, wire_bytes: dict[str, bytes]
+) -> None:
+    raw = idl.deserialize(wire_bytes[key])
+    assert raw.header.stamp.sec * 10**9 + raw.header.stamp.nanosec == START_NS
+    assert (raw.header.frame_id, raw.sequence, raw.valid, raw.reason) == (message.frame_id, 0, True, "")
+    if key == "keypoints":
+        assert np.array_equal(np.reshape(raw.position_px, (12, 2)), message.position_px)
+        assert list(raw.status) == message.status.tolist()
+        assert (raw.body_length_px, raw.people) == (150.0, 1)
+    elif key == "fall_horizon":
+        assert np.array_equal(np.reshape(raw.forecast_px, (16, 12, 2)), message.forecast_px)
+        assert np.array_equal(np.reshape(raw.centre_distance, (16, 3)), message.centre_distance)
+        assert (raw.quality, raw.step_s) == (message.quality, message.step_s)
+    else:
+        assert (raw.state, raw.solver, raw.lifetime_s) == ("FOLLOW", "mpc", 0.06)
+        assert raw.rests_on.sec * 10**9 + raw.rests_on.nanosec == message.rests_on_ns
+        assert (raw.twist.linear.x, raw.twist.linear.z, raw.twist.angular.z) == (0.4, 0.0, 0.05)
+        assert list(raw.damping) == [30, 30, 10, 200]
+        assert np.isnan(raw.fall_distance)
+
+
+@pytest.mark.parametrize(("key", "topic", "idl", "message"), EXAMPLES, ids=[example[0] for example in EXAMPLES])
+def test_pycdr2_writes_the_same_bytes(key: str, topic: Any, idl: Any, message: Any) -> None:
+    payload = encode(topic, message)
+    again = idl.deserialize(payload).serialize()
+    padding = len(payload) - len(again)  # a trailing alignment is the writer's choice
+    assert abs(padding) < 4
+    shorter = min(len(payload), len(again))
+    assert again[4:shorter] == payload[4:shorter]
+
+
+@pytest.fixture(scope="module")
+def wire_bytes() -> dict[str, bytes]:
+    """What a Zenoh subscriber of its own, without any of Surefoot's reading code, receives of each message."""
+    port = free_ports(1)[0]
+    config = BridgeConfig(endpoints={"perception": f"tcp/127.0.0.1:{port}"})
+    settings = zenoh.Config()
+    for path, value in {
+        "connect/endpoints": [f"tcp/127.0.0.1:{port}"],
+        "listen/endpoints": [],
+        "scouting/multicast/enabled": False,
+    }.items():
+        settings.insert_json5(path, json.dumps(value))
+    transport = ZenohTransport(config, "perception", SystemClock())
+    got: dict[str, bytes] = {}
+    complete = threading.Event()
+
+    def receive(sample: Any) -> None:
+        got[str(sample.key_expr).rpartition("/")[2]] = sample.payload.to_bytes()
+        if len(got) == len(EXAMPLES):
+            complete.set()
+
+    session = zenoh.open(settings)
+    subscriber = session.declare_subscriber("surefoot/*", zenoh.handlers.Callback(receive, indirect=False))
+    try:
+        for _ in range(300):  # until the subscriber is known to the publishers
+            for _, topic, _, message in EXAMPLES:
+                outbox = Outbox(transport, topic)
+                outbox.send(message)
+                outbox.close()
+            if complete.wait(0.1):
+                return got
+        raise AssertionError(f"only {sorted(got)} arrived")
+    finally:
+        subscriber.undeclare()
+        session.close()
+        transport.close()
+
+
+def test_the_stamp_is_found_without_decoding() -> None:
+    for event in EVENTS[:20]:
+        assert header_stamp_ns(event.sample.payload) == event.message.stamp_ns
+    payload = EVENTS[0].sample.payload
+    big_endian = b"\x00\x00\x00\x00" + payload[7:3:-1] + payload[11:7:-1] + payload[12:]
+    assert header_stamp_ns(big_endian) == EVENTS[0].message.stamp_ns
+    assert header_stamp_ns(b"\x00\x01\x00\x00") is None
+
+
+def test_a_foreign_file_is_read_too(tmp_path: Path) -> None:
+    """Written by `rosbags`, as `ros2 bag record` would: no publisher named, one channel a topic."""
+    with Writer(tmp_path / "foreign", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connections = {
+            topic.key: writer.add_connection(f"/surefoot/{topic.key}", topic.ros_type, typestore=STORE)
+            for topic in TOPICS
+        }
+        other = writer.add_connection("/camera_info", "std_msgs/msg/String", typestore=STORE)
+        writer.write(other, START_NS, b"\x00\x01\x00\x00\x02\x00\x00\x00a\x00")
+        for event in EVENTS:
+            writer.write(connections[event.topic.key], event.sample.arrival_ns, event.sample.payload)
+    recording = Recording(tmp_path / "foreign")
+    found = [(recorded.topic, recorded.sample) for recorded in recording.samples()]
+    assert found == [(event.topic, Sample(event.sample.payload, -1, b"", event.sample.arrival_ns)) for event in EVENTS]
+    assert recording.foreign == {("/camera_info", "std_msgs/msg/String"): 1}
