@@ -36,7 +36,7 @@ class AdmittanceConfig(Section):
     """Damping about the vertical in free walking [N m s/rad]."""
 
     damping_free_height_ns_m: float = Field(default=800.0, ge=1, le=20000)
-    """Damping of the column in free walking: the pelvis' 40 mm swing at 2 Hz is mostly followed by the harness [N s/m]."""
+    """Damping of the column in free walking: it drifts after the person and does not dance with each step [N s/m]."""
 
     damping_arrest_horizontal_ns_m: float = Field(default=800.0, ge=1, le=20000)
     """Forward and sideward damping in an arrest [N s/m]; 1.15 times critical with the defaults."""
@@ -61,6 +61,12 @@ class AdmittanceConfig(Section):
 
     height_hold_m: float = Field(default=1.0, gt=0, le=3)
     """Height of the interface above the floor in free walking [m]; must lie within the column's stroke."""
+
+    spring_reach_horizontal_m: float = Field(default=0.15, gt=0, le=2)
+    """How far the horizontal spring stretches before its anchor slips along [m]: bounds the pull on who walks on."""
+
+    spring_reach_yaw_rad: float = Field(default=0.4, gt=0, le=3)
+    """How far the yaw spring turns before its anchor slips along [rad]."""
 
     tank_initial_j: float = Field(default=15.0, ge=0, le=1000)
     """Energy in the tank at the start [J]: what stiffening may inject before anything was dissipated."""

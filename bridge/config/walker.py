@@ -129,7 +129,7 @@ class WalkerConfig(Section):
     """Largest column jerk [m/s^3]; assumed."""
 
     column_force_max_n: float = Field(default=3500.0, gt=0, le=50000)
-    """Largest force of the column: 100 kg caught at 2.1 m/s within 0.1 m pull 3.2 kN, the carriage weighs 0.2 kN [N]."""
+    """Largest force of the column: 100 kg caught at 2.1 m/s in 0.1 m pull 3.2 kN, the carriage weighs 0.2 kN [N]."""
 
     support_margin_m: float = Field(default=0.06, ge=0, le=1)
     """How far inside the wheels' rectangle the zero-moment point must stay [m]; assumed."""

@@ -1,0 +1,229 @@
+"""The controller that moves the walker: admittance, stiffened as the decision says, rendered by the MPC.
+
+Each step ends in one of three laws, named in the command's `solver`: `mpc`, the first input of an accepted plan;
+`fallback`, the one-step admittance law inside the limits, for a bounded time; `stop`, base and column brought to
+rest. All three pass the same limiter from the same last acceleration, so changing between them cannot jump.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from bridge.clock import seconds
+from bridge.config.admittance import AdmittanceConfig
+from bridge.config.mpc import MpcConfig
+from bridge.config.walker import WalkerConfig
+from bridge.errors import ConfigError, InvalidMessage
+from bridge.messages import Floats, Odometry, SupportCommand, Wrench
+from controller.admittance import Admittance
+from controller.commanded_motion import CommandedMotion
+from controller.fallback import fallback_acceleration, stop_acceleration, within_machine
+from controller.interface import Decision
+from controller.machine_limits import MachineLimits
+from controller.motion_limits import MotionLimits
+from controller.mpc.plan import Failure, Plan
+from controller.mpc.predictive_law import Instant, PredictiveLaw, fading, remaining
+from controller.walker import Walker
+
+Solver = Literal["mpc", "fallback", "stop"]
+# Tip-over rows hang on the column's height by the carriage's share of the centre of mass: 5 mm move it by 1 mm.
+_RELINEARISE_M = 0.005
+_LONGEST_PERIODS = 2.0  # a late step is integrated over at most this many periods
+
+
+class _Inputs(NamedTuple):
+    """What a step rests on, once judged."""
+
+    span_s: float  # since the step before [s]
+    wrench: Floats  # (6,) measured now, or foreseen by the last usable one
+    draw: Floats  # (4,) force of the coupling to the measured motion
+    profile: Floats  # (N,) stiffening
+    faults: tuple[str, ...]  # why the MPC must not be asked
+
+
+class _Choice(NamedTuple):
+    """The acceleration one law asks for, before the limiter."""
+
+    solver: Solver
+    wanted: Floats
+    rendered: Instant | None  # what the admittance was rendered from; None in a stop
+    reason: str = ""
+    solve_time_s: float = 0.0
+
+
+class AdmittanceController:
+    """MPC admittance controller behind the `Controller` protocol.
+
+    Args:
+        walker: masses, sizes, limits.
+        admittance: what the person feels.
+        mpc: horizon, weights, solver, fallback.
+        period_s: control period [s].
+        lifetime_s: how long a command may be executed [s].
+
+    Raises:
+        ConfigError: the held column height lies outside the stroke.
+    """
+
+    def __init__(
+        self,
+        walker: WalkerConfig,
+        admittance: AdmittanceConfig,
+        mpc: MpcConfig,
+        period_s: float = 0.01,
+        lifetime_s: float = 0.06,
+    ) -> None:
+        if not walker.column_low_m <= admittance.height_hold_m <= walker.column_high_m:
+            raise ConfigError(
+                f"admittance.height_hold_m = {admittance.height_hold_m:g} is outside the column's stroke, "
+                f"{walker.column_low_m:g}..{walker.column_high_m:g} (walker.column_low_m, column_high_m)"
+            )
+        self._config = mpc
+        self._period_s = period_s
+        self._lifetime_s = lifetime_s
+        self._walker = Walker(walker)
+        self._limits = MotionLimits(walker)
+        self._machine = MachineLimits(self._walker)
+        self._fading = fading(mpc)
+        self._admittance = Admittance(admittance, mpc.stage_s, self._fading)
+        self._predictive = PredictiveLaw(self._walker, self._admittance, self._machine, mpc, period_s)
+        self._motion = CommandedMotion(mpc, self._limits, (walker.column_low_m, walker.column_high_m))
+        self.reset()
+
+    @property
+    def tank_energy_j(self) -> float:
+        """Energy that stiffening may still spend [J]."""
+        return self._admittance.tank.energy_j
+
+    def reset(self) -> None:
+        """Forget the past: the next step starts from the measured motion."""
+        self._admittance.reset()
+        self._predictive.reset()
+        self._started = False
+        self._last_ns: int | None = None
+        self._last_solved_ns = 0
+        self._wrench_ns = 0
+        self._wrench: Floats = np.zeros(6)
+        self._profile: Floats = np.zeros(self._config.stages)
+        self._linearised_at_m = float("nan")
+        self.last_plan: Plan | None = None
+
+    def step(self, now_ns: int, odometry: Odometry, wrench: Wrench, decision: Decision) -> SupportCommand:
+        """Return the command for the period that starts at `now_ns`; bad numbers never raise."""
+        inputs = self._take(now_ns, odometry, wrench, decision)
+        motion = self._motion
+        choice = self._choose(now_ns, inputs, decision)
+        acceleration = self._limits.clamp(
+            choice.wanted, motion.velocity, motion.acceleration, float(motion.pose[3]), inputs.span_s
+        )
+        before = motion.velocity
+        motion.advance(acceleration, inputs.span_s)
+        law = choice.rendered
+        if law is not None:
+            self._admittance.settle(before, motion.velocity, law.law, law.force[0], inputs.span_s)
+        reasons = (decision.reason, *inputs.faults, choice.reason)
+        return SupportCommand(
+            stamp_ns=now_ns,
+            velocity=motion.velocity,
+            acceleration=acceleration,
+            column_height=float(motion.pose[3]),
+            stiffening=float(inputs.profile[0]),
+            damping=np.zeros(4) if law is None else law.law.damping[0],
+            stiffness=np.zeros(4) if law is None else law.law.stiffness[0],
+            state=decision.state,
+            solver=choice.solver,
+            lifetime_s=self._lifetime_s,
+            reason="; ".join(reason for reason in reasons if reason),
+            rests_on_ns=decision.rests_on_ns,
+            fall_distance=decision.fall_distance,
+            fall_probability=decision.fall_probability,
+            solve_time_s=choice.solve_time_s,
+        )
+
+    def _take(self, now_ns: int, odometry: Odometry, wrench: Wrench, decision: Decision) -> _Inputs:
+        """Judge what came in, and put what was foreseen in the place of what cannot be used."""
+        faults: list[str] = []
+        elapsed_s = self._period_s if self._last_ns is None else seconds(now_ns - self._last_ns)
+        span_s = min(max(elapsed_s, 0.0), _LONGEST_PERIODS * self._period_s)
+        self._last_ns = now_ns
+
+        fault = _fault(odometry)
+        if fault:
+            faults.append(fault)
+        elif not self._started:
+            self._motion.start(odometry)
+            self._started = True
+            self._last_solved_ns = now_ns
+        else:
+            self._motion.follow(odometry, span_s)
+        draw = np.zeros(4) if fault else self._motion.coupling(odometry, self._admittance.mass)
+
+        fault = _fault(wrench)
+        if fault:
+            faults.append(fault)
+        else:
+            self._wrench_ns, self._wrench[:3], self._wrench[3:] = now_ns, wrench.force, wrench.torque
+        # An unusable wrench is not taken for none: what the last usable one was expected to become stands in,
+        # for as long as the fallback may.
+        age_s = max(seconds(now_ns - self._wrench_ns), 0.0)
+        present = self._wrench * remaining(self._config, age_s)
+
+        profile = decision.profile
+        if profile.shape != self._profile.shape:
+            faults.append(f"stiffening profile has shape {profile.shape}, expected {self._profile.shape}")
+        elif not ((profile >= 0.0) & (profile <= 1.0)).all():
+            faults.append("stiffening profile is not within 0..1")
+        else:
+            self._profile = profile
+        return _Inputs(span_s, present, draw, self._profile, tuple(faults))
+
+    def _choose(self, now_ns: int, inputs: _Inputs, decision: Decision) -> _Choice:
+        """Return what the best law that can be had asks for."""
+        motion = self._motion
+        height_m = float(motion.pose[3])
+        terms = self._walker.evaluate(height_m, motion.velocity)
+        if not abs(height_m - self._linearised_at_m) <= _RELINEARISE_M:
+            self._machine.linearise(terms)
+            self._linearised_at_m = height_m
+        wrenches = self._fading[:, None] * inputs.wrench
+        bounds = self._machine.bounds(terms, wrenches)
+        give_way = self._machine.give_way(terms, wrenches, bounds)
+
+        def allowed(wanted: Floats) -> Floats:
+            return within_machine(wanted, give_way, self._machine.rows, bounds)
+
+        stop = stop_acceleration(motion.velocity, self._limits, inputs.span_s)
+        if decision.stop or not self._started:
+            self._admittance.release()
+            return _Choice("stop", allowed(stop), None, "" if decision.stop else "no usable odometry yet")
+
+        force = wrenches @ terms.interface + self._fading[:, None] * inputs.draw
+        law = self._admittance.stages(inputs.profile, motion.pose, motion.velocity, force[0])
+        instant = Instant(law, force, motion.velocity, motion.acceleration, height_m, bounds, give_way)
+        failure = Failure("", "")
+        if not inputs.faults:
+            outcome = self._predictive.plan(instant)
+            if isinstance(outcome, Plan):
+                self._last_solved_ns = now_ns
+                self.last_plan = outcome
+                return _Choice("mpc", outcome.acceleration[0], instant, solve_time_s=outcome.solve_time_s)
+            failure = outcome
+        without_s = seconds(now_ns - self._last_solved_ns)
+        if without_s > self._config.fallback_max_s:
+            self._admittance.release()
+            reason = f"no plan for {without_s * 1e3:.0f} ms, limit {self._config.fallback_max_s * 1e3:.0f}"
+            reason = f"{failure.reason}; {reason}" if failure.reason else reason
+            return _Choice("stop", allowed(stop), None, reason, failure.solve_time_s)
+        wanted = fallback_acceleration(law, force[0], motion.velocity, self._period_s)
+        return _Choice("fallback", allowed(wanted), instant, failure.reason, failure.solve_time_s)
+
+
+def _fault(message: Odometry | Wrench) -> str:
+    """Return why a message must not be acted on, '' if it may."""
+    try:
+        message.check()
+    except InvalidMessage as error:
+        return str(error)
+    return ""

@@ -1,0 +1,160 @@
+"""What wheels, floor, column and balance allow: linear limits on the walker's acceleration under a person's wrench.
+
+With the reduced model `M a + n = Q + F`, Q the person's wrench and F what the drives add, along (x, y, yaw, height):
+
+- wheel torque: `tau = (J^T)^+ (M a + n - Q)`, each within the motor's limit;
+- traction: the horizontal force on the floor, without what only spins wheels, inside the friction circle
+  (an octagon within it) of the load that rests on the floor;
+- tip-over: the zero-moment point (Vukobratovic and Borovac 2004) of walker and wrench inside the wheels' rectangle
+  less a margin, as moments, so that it stays linear: `m_x - x_s N <= 0`;
+- column: `F_height` within the column's force, as limits on its acceleration.
+
+Rows are scaled so that 1 is the machine's limit.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from bridge.messages import Floats
+from controller.walker import Walker, WalkerTerms
+
+WHEEL_ROWS = slice(0, 4)
+TRACTION_ROWS = slice(4, 8)
+DRIVE_ROWS = slice(0, 8)
+TIP_ROWS = slice(8, 12)
+ROWS = 12
+_TIP_FRONT, _TIP_REAR, _TIP_LEFT, _TIP_RIGHT = 8, 9, 10, 11
+
+
+class MachineBounds(NamedTuple):
+    """Limits for the wrenches of `stages` instants: `low <= rows @ a <= high`, `box_low <= a <= box_high`."""
+
+    low: Floats  # (stages, 12); -inf for tip-over
+    high: Floats  # (stages, 12)
+    box_low: Floats  # (stages, 4) [m/s^2, rad/s^2]
+    box_high: Floats  # (stages, 4)
+
+
+class MachineLimits:
+    """Acceleration limits of a walker.
+
+    Attributes:
+        rows: (12, 4) four wheels' torque, four directions of traction, four tipping edges (front, rear, left, right).
+    """
+
+    def __init__(self, walker: Walker) -> None:
+        config = walker.config
+        self._walker = walker
+        self._weight = walker.weight
+        self._half = np.array([0.5 * config.wheelbase_m, 0.5 * config.track_m]) - config.support_margin_m
+        self._column_force = config.column_force_max_n
+        self._acceleration: Floats = np.array(config.acceleration_max)
+        self._shifting = config.carriage_mass_kg * config.column_acceleration_max_m_s2
+        self._wheel_map: Floats = walker.wheel_force / config.wheel_torque_max_nm
+        angles = np.pi / 8 + np.arange(4) * np.pi / 4
+        # The octagon lies inside the circle: its faces are cos(22.5 deg) of the radius away.
+        self._traction_map: Floats = np.stack([np.cos(angles), np.sin(angles)], axis=1) / (
+            config.friction_coefficient * self._weight * np.cos(np.pi / 8)
+        )
+        self.rows: Floats = np.zeros((ROWS, 4))
+        self._edges: Floats = np.zeros((4, 3))
+        for edge in range(4):
+            axis, sign = edge // 2, 1.0 - 2.0 * (edge % 2)
+            self._edges[edge, axis] = sign / (self._weight * self._half[axis])
+            self._edges[edge, 2] = -1.0 / self._weight
+        self.linearise(walker.terms)
+
+    def linearise(self, terms: WalkerTerms) -> None:
+        """Set `rows` from the model's terms. Only tip-over varies, with the column's height."""
+        self.rows[WHEEL_ROWS, :3] = self._wheel_map @ terms.mass[:3, :3]
+        floor = terms.mass - self._walker.reflected
+        self.rows[TRACTION_ROWS] = self._traction_map @ floor[:2]
+        self.rows[TIP_ROWS] = self._edges @ ground_moments(terms, self._weight).by_acceleration
+
+    def bounds(self, terms: WalkerTerms, wrench: Floats) -> MachineBounds:
+        """Return the limits under `wrench` (stages, 6): force [N], then torque [N m], at the interface."""
+        stages = wrench.shape[0]
+        load = terms.bias - wrench @ terms.interface  # (stages, 4), what the drives must carry at rest
+        low = np.empty((stages, ROWS))
+        high = np.empty((stages, ROWS))
+        torque = load[:, :3] @ self._wheel_map.T
+        low[:, WHEEL_ROWS] = -1.0 - torque
+        high[:, WHEEL_ROWS] = 1.0 - torque
+        # The column's own acceleration may take this much load off the floor; less than none grips nothing.
+        grip = np.maximum((self._weight - wrench[:, 2:3] - self._shifting) / self._weight, 0.0)
+        slip = load[:, :2] @ self._traction_map.T
+        low[:, TRACTION_ROWS] = -grip - slip
+        high[:, TRACTION_ROWS] = grip - slip
+        _, bias, by_wrench = ground_moments(terms, self._weight)
+        low[:, TIP_ROWS] = -np.inf
+        high[:, TIP_ROWS] = -(bias + wrench @ by_wrench.T) @ self._edges.T
+        box_low = np.tile(-self._acceleration, (stages, 1))
+        box_high = -box_low
+        inertia = terms.mass[3, 3]
+        box_low[:, 3] = np.clip(
+            (-self._column_force - load[:, 3]) / inertia, -self._acceleration[3], self._acceleration[3]
+        )
+        box_high[:, 3] = np.clip(
+            (self._column_force - load[:, 3]) / inertia, -self._acceleration[3], self._acceleration[3]
+        )
+        return MachineBounds(low, high, box_low, box_high)
+
+    def give_way(self, terms: WalkerTerms, wrench: Floats, bounds: MachineBounds) -> Floats:
+        """Return the (4,) acceleration nearest to rest that the machine can hold under the first of `wrench`.
+
+        Zero in all ordinary cases. Where the person pushes harder than wheels or floor can resist it gives way
+        until they can; where the push would tip the walker it moves under the push.
+        """
+        low, high = bounds.low[0], bounds.high[0]
+        value = np.zeros(4)
+        middle = 0.5 * (low[DRIVE_ROWS] + high[DRIVE_ROWS])
+        width = 0.5 * (high[DRIVE_ROWS] - low[DRIVE_ROWS])
+        ratio = float(np.max(np.abs(middle) / np.maximum(width, 1e-3)))
+        if ratio > 1.0:
+            yielding = np.linalg.solve(terms.mass[:3, :3], (wrench[0] @ terms.interface - terms.bias)[:3])
+            value[:3] = (1.0 - 1.0 / ratio) * yielding
+        value[3] = min(max(0.0, float(bounds.box_low[0, 3])), float(bounds.box_high[0, 3]))
+        for axis, fore, back in ((0, _TIP_FRONT, _TIP_REAR), (1, _TIP_LEFT, _TIP_RIGHT)):
+            # Accelerating forward moves the zero-moment point back: the fore edge bounds from below.
+            least, most = (
+                float((high[row] - self.rows[row] @ value) / self.rows[row, axis] + value[axis]) for row in (fore, back)
+            )
+            value[axis] = min(max(float(value[axis]), least), most) if least <= most else 0.5 * (least + most)
+        return np.clip(value, -self._acceleration, self._acceleration)
+
+
+class GroundMoments(NamedTuple):
+    """Moments about the base frame's origin and load on the floor: `(N x_zmp, N y_zmp, N) = G a + b + H w`."""
+
+    by_acceleration: Floats  # G (3, 4)
+    bias: Floats  # b (3,) [N m, N m, N]
+    by_wrench: Floats  # H (3, 6)
+
+
+def ground_moments(terms: WalkerTerms, weight_n: float) -> GroundMoments:
+    """Return the balance of momentum, solved for what the floor must give.
+
+    With c the centre of mass, R = (R_x, R_y, N) the floor's reaction and L the angular momentum about c:
+    `N x = c_x N - c_z R_x - L_y' + ((p - c) x f)_y + t_y`, and alike for y; R = P' + weight - f.
+    """
+    momentum, rate, centre, point = terms.momentum, terms.momentum_bias, terms.centre_of_mass, terms.interface_position
+    G = np.empty((3, 4))
+    G[0] = centre[0] * momentum[2] - centre[2] * momentum[0] - momentum[4]
+    G[1] = centre[1] * momentum[2] - centre[2] * momentum[1] + momentum[3]
+    G[2] = momentum[2]
+    load = weight_n + rate[2]
+    bias = np.array(
+        [
+            centre[0] * load - centre[2] * rate[0] - rate[4],
+            centre[1] * load - centre[2] * rate[1] + rate[3],
+            load,
+        ]
+    )
+    H = np.zeros((3, 6))
+    H[0, 0], H[0, 2], H[0, 4] = point[2], -point[0], 1.0
+    H[1, 1], H[1, 2], H[1, 3] = point[2], -point[1], -1.0
+    H[2, 2] = -1.0
+    return GroundMoments(G, bias, H)
