@@ -18,8 +18,8 @@ from bridge.config.anticipation import QualityConfig
 from bridge.messages import KEYPOINTS, Floats, KeypointStatus
 from perception.skeleton import LINKS
 
-_TRIMMED: Final = 0.02  # share of the training poses left out as detector errors
-_RARE: Final = 0.99  # quantile of the training poses that still counts as seen
+_TRIMMED: Final = 0.05  # share of the training poses left out as detector errors
+_RARE: Final = 0.97  # quantile of the training poses that still counts as seen
 _SIZE_STEP: Final = math.log(1.25)  # a skeleton a quarter larger or smaller than any seen is one unit stranger
 
 _WEIGHT: Final = np.zeros(3)
@@ -38,8 +38,8 @@ class PoseStatistics:
 
     mean: Floats  # (36,)
     whitening: Floats  # (36, 36): the distance of a pose is |(x - mean) @ whitening| / 6, about 1 in training
-    limit: float  # distance that one training pose in a hundred exceeds
-    sizes: Floats  # (2,) smallest and largest sum of link lengths, but for one pose in a hundred [body lengths]
+    limit: float  # distance that three training poses in a hundred exceed
+    sizes: Floats  # (2,) smallest and largest sum of link lengths, but for three poses in a hundred [body lengths]
 
     def __post_init__(self) -> None:
         for name, shape in (("mean", (36,)), ("whitening", (36, 36)), ("sizes", (2,))):
@@ -91,7 +91,7 @@ class PoseStatistics:
         return self.mean[: 2 * KEYPOINTS].reshape(KEYPOINTS, 2)
 
     def strangeness(self, poses: NDArray[np.floating]) -> Floats:
-        """How unlike those in training each pose (N, 12, 2) is: (N,), 1 is as unlike as one training pose in 100.
+        """How unlike those in training each pose (N, 12, 2) is: (N,), 3 % of those are beyond 1.
 
         The larger of the distance from the Gaussian and of what the size lacks or exceeds.
         """

@@ -27,6 +27,7 @@ class PoseWindow:
         self._hold_ns = nanoseconds(config.hold_s)
         self._longest_gap = round(config.max_gap_s / STEP_S)  # ticks
         self._min_keypoints = config.min_keypoints
+        self._min_body_length_px = config.min_body_length_px
         self._mean_pose = mean_pose
         self.relative: NDArray[np.float32] = np.zeros((WINDOW, KEYPOINTS, 2), dtype=np.float32)  # [body lengths]
         self.status: Bytes = np.zeros((WINDOW, KEYPOINTS), dtype=np.uint8)  # KeypointStatus
@@ -68,8 +69,8 @@ class PoseWindow:
     def _judge(self, keypoints: Keypoints, centre: Floats) -> str:
         if not keypoints.valid:
             return f"keypoints are not valid: {keypoints.reason or 'no reason given'}"
-        if not (np.isfinite(keypoints.body_length_px) and keypoints.body_length_px > 0):
-            return f"body length is {keypoints.body_length_px} px, expected a positive number"
+        if not keypoints.body_length_px >= self._min_body_length_px:  # nor NaN
+            return f"body length is {keypoints.body_length_px:.1f} px, limit {self._min_body_length_px:.1f}"
         seen = int(np.count_nonzero(keypoints.status != KeypointStatus.LOST))
         if seen < self._min_keypoints:
             return f"{seen} of {KEYPOINTS} keypoints are there, limit {self._min_keypoints}"

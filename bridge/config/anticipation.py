@@ -17,8 +17,8 @@ class QualityConfig(Section):
     measured_share_zero: float = Field(default=0.35, ge=0, lt=1)
     """Share at and below which the quality is 0."""
     strangeness_full: float = Field(default=1.0, gt=0, le=10)
-    """Distance from the training poses up to which a pose counts as seen; about one of those in 100 is beyond 1."""
-    strangeness_zero: float = Field(default=3.0, gt=0, le=100)
+    """Distance from the training poses up to which a pose counts as seen; 3 % of those are beyond 1."""
+    strangeness_zero: float = Field(default=4.0, gt=0, le=100)
     """Distance at and beyond which the quality is 0."""
     several_people: float = Field(default=0.6, ge=0, le=1)
     """Factor while the detector sees more than one person."""
@@ -47,6 +47,8 @@ class AnticipationConfig(Section):
     """A lost keypoint is held at its last place relative to the body for this long, then at the average place."""
     min_keypoints: int = Field(default=6, ge=2, le=12)
     """With fewer keypoints than this in the newest frame there is no horizon."""
+    min_body_length_px: float = Field(default=16.0, gt=0, le=1000)
+    """A person who looks smaller than this is too far away: the detector's noise would be larger than the motion."""
     min_quality: float = Field(default=0.05, ge=0, le=1)
     """Below this quality the horizon is declared invalid."""
     max_centre_speed_body_lengths_s: float = Field(default=3.0, ge=0, le=20)

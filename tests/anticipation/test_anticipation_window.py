@@ -100,7 +100,8 @@ def test_old_and_repeated_ticks_are_ignored():
         (lost(15, [0, 1]), "upper-body centre"),
         (lost(15, [6, 7]), "upper-body centre"),
         (lost(15, [2, 3, 4, 5, 8, 9, 10]), "5 of 12 keypoints are there, limit 6"),
-        (message(15, body_length_px=np.nan), "body length"),
+        (message(15, body_length_px=np.nan), "body length is nan px, limit 16"),
+        (message(15, body_length_px=15.0), "body length is 15.0 px, limit 16"),
     ],
 )
 def test_what_cannot_be_used_is_named_and_forgotten_when_it_is_short(bad, says):
