@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from bridge_toys import PATIENCE_S, Stage, Up, wait_until
+from numpy.typing import NDArray
 
 from bridge.config.launch import DEFAULT_MODULES
 from bridge.config.surefoot import SurefootConfig
@@ -21,7 +22,7 @@ DEMO = REPO / "simulation" / "demo" / "walk-stumble-fall.npz"
 CONFIG = SurefootConfig()
 RESTING = {"SAFE_STOP", "DISARMED"}
 
-pytestmark = pytest.mark.processes
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]  # several waits, each patient with a busy machine
 
 
 @pytest.fixture
@@ -35,17 +36,23 @@ def stage(tmp_path: Path) -> Stage:
 def clip(tmp_path: Path) -> str:
     """Return the source: three seconds of walking, then the fall of the shipped recording."""
     with np.load(DEMO) as arrays:
-        fall = int(np.argmax(arrays["walk-stumble-fall/label"] == 0))
-        frames = slice(fall - 90, fall + 50)
-        np.savez(
-            tmp_path / "clip.npz",
-            **{
-                "fall/keypoints": arrays["walk-stumble-fall/keypoints"][frames],
-                "fall/fps": arrays["walk-stumble-fall/fps"],
-                "fall/image_size": arrays["walk-stumble-fall/image_size"],
-            },
-        )
-    return f"{tmp_path / 'clip.npz'}:fall"
+        onset = int(np.argmax(arrays["walk-stumble-fall/label"] == 0))
+    return write_clip(tmp_path, "fall", np.arange(onset - 90, onset + 50))
+
+
+@pytest.fixture
+def walk(tmp_path: Path) -> str:
+    """Return the source: five minutes of walking, the shipped recording's beginning forward and backward again."""
+    there = np.arange(150)
+    return write_clip(tmp_path, "walk", np.tile(np.concatenate([there, there[-2:0:-1]]), 30))
+
+
+def write_clip(folder: Path, name: str, frames: NDArray[np.int64]) -> str:
+    with np.load(DEMO) as arrays:
+        clip = {key: arrays[f"walk-stumble-fall/{key}"] for key in ("keypoints", "fps", "image_size")}
+    clip["keypoints"] = clip["keypoints"][frames]
+    np.savez(folder / f"{name}.npz", **{f"{name}/{key}": array for key, array in clip.items()})
+    return f"{folder / name}.npz:{name}"
 
 
 def test_mock_records_a_fall_seen_coming_and_the_safe_stop(stage: Stage, clip: str) -> None:
@@ -78,27 +85,28 @@ def check_order(records: list[dict[str, Any]]) -> None:
         assert 0 < earlier["rests_on_ns"] <= later["rests_on_ns"]
 
 
-def test_real_controller_moves_on_solved_problems_and_stops_when_blind(stage: Stage, clip: str) -> None:
-    with Up(stage, "--source", clip) as up:
-        up.wait_for(lambda record: record.get("command") and record["command"]["solver"] == "mpc")
+def test_real_controller_moves_on_solved_problems_and_stops_when_blind(stage: Stage, walk: str) -> None:
+    with Up(stage, "--source", walk, "--set", "launch.restart=false") as up:
+        record = up.wait_for(
+            lambda record: (
+                record.get("command")
+                and record["command"]["solver"] == "mpc"
+                and record["command"]["velocity"][0] > 0.0
+            )
+        )
+        os.kill(record["roles"]["perception"]["pid"], signal.SIGKILL)
+        blind = up.wait_for(lambda record: record.get("command") and record["command"]["state"] == "SAFE_STOP")
+        assert blind["command"]["solver"] == "stop"
+        up.process.send_signal(signal.SIGINT)
         code, errors = up.end()
-    assert (code, errors) == (0, "")
+    assert code == 1, "perception was not started again"
+    assert "perception was killed by signal 9" in errors
     assert stage.left() == []
-    commands = [record["command"] for record in up.seen if record.get("command")]
-    assert any(command["velocity"][0] != 0.0 for command in commands), "the base follows the person's push"
-    assert commands[-1]["state"] == "SAFE_STOP"
-    assert commands[-1]["solver"] == "stop"
-    roles = up.seen[-1]["roles"]
-    assert {role: roles[role]["restarts"] for role in roles} == dict.fromkeys(DEFAULT_MODULES, 0)
 
 
-def test_losing_the_anticipation_stops_the_walker_until_it_is_back(stage: Stage, clip: str) -> None:
+def test_losing_the_anticipation_stops_the_walker_until_it_is_back(stage: Stage, walk: str) -> None:
     log = stage.folder / "asked.jsonl"
-    walk = stage.folder / "walk.npz"
-    with np.load(clip.rpartition(":")[0]) as arrays:
-        there_and_back = np.concatenate([arrays["fall/keypoints"][:90], arrays["fall/keypoints"][88:0:-1]])
-        np.savez(walk, **{"walk/keypoints": np.tile(there_and_back, (20, 1, 1)), "walk/fps": arrays["fall/fps"]})
-    with Up(stage, "--source", f"{walk}:walk", "--controller", "log", "--log", str(log)) as up:
+    with Up(stage, "--source", walk, "--controller", "log", "--log", str(log)) as up:
         record = up.wait_for(lambda record: record.get("command") and record["command"]["solver"] == "log")
         os.kill(record["roles"]["anticipation"]["pid"], signal.SIGKILL)
         wait_until(lambda: calls(log)[-1]["state"] == "SAFE_STOP", "safe stop", PATIENCE_S)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from bridge_toys import PATIENCE_S, ROLES, Stage, Up, all_alive, listening, wait_until
 
-pytestmark = pytest.mark.processes
+pytestmark = [pytest.mark.processes, pytest.mark.timeout(300)]  # several waits, each patient with a busy machine
 PAIR = ("--roles", "perception,controller")
 
 
