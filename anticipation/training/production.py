@@ -17,7 +17,6 @@ from anticipation.motion import WINDOW
 from anticipation.quality import PoseStatistics
 from anticipation.training.corpus import Corpus, Shares, people_folds, shares, tested
 from anticipation.training.evaluation import predict
-from anticipation.training.fitting import apply
 from anticipation.training.measures import temperatures
 from anticipation.training.networks import fitted_classifier, pretrained_forecaster, tuned_forecaster
 from anticipation.training.plan import Plan
@@ -31,6 +30,8 @@ LICENCE: Final = (
     "Bandai Namco Research Motiondataset (CC BY-NC 4.0) and CMU mocap (free for all uses)"
 )
 DATA: Final = ("URFD", "UP-Fall", "Bandai Namco Research Motiondataset", "CMU mocap")
+PLANE_DAILY: Final = 500  # windows of daily activities the plane is fitted to
+PLANE_WALKS: Final = 2000  # windows of mocap
 POSES: Final = 20_000  # poses that describe what a person looks like
 
 
@@ -57,7 +58,7 @@ def make_checkpoint(
     return Checkpoint(
         forecaster=forecaster,
         classifier=classifier,
-        plane=_plane(classifier, everything),
+        plane=_plane(corpus, seed),
         statistics=_statistics(everything, seed),
         temperature=temperature,
         provenance=Provenance(DATA, LICENCE, protocol, {} if evaluation is None else dict(evaluation)),
@@ -86,15 +87,22 @@ def _fit(
     return forecaster, fitted_classifier(plan, known, forecaster, name, progress)
 
 
-def _plane(classifier: DirectedGraphNetwork, known: Shares) -> TransientPlane:
-    """Fit the plane to the windows of filmed people (mocap would drown the falls)."""
+def _plane(corpus: Corpus, seed: int) -> TransientPlane:
+    """Fit the plane to windows of the URFD falls, with some of daily life and of walks to keep the boundary off them.
+
+    Its features are the windows themselves: over the last second before lying the distance to the fall region then
+    falls steadily (docs/anticipation.md), which it does not on the classifier's pooled features.
+    """
+    rng = np.random.default_rng(seed)
     features, labels = [], []
-    for samples, _ in known.gait[:-1]:
-        there = samples.labels[:, 0] >= 0
-        pooled = apply(classifier.embedding, samples.poses[there, :WINDOW])
-        features.append(pooled[:, -1])
-        labels.append(samples.labels[there, 0])
-    return TransientPlane.fit(np.concatenate(features), np.concatenate(labels), "embedding")
+    for tracks, most in ((corpus.falls, None), (corpus.daily, PLANE_DAILY), (corpus.walks, PLANE_WALKS)):
+        samples = cut(tracks)
+        rows = np.flatnonzero(samples.labels[:, 0] >= 0)
+        if most is not None and most < len(rows):
+            rows = np.sort(rng.choice(rows, most, replace=False))
+        features.append(samples.poses[rows, :WINDOW].reshape(len(rows), -1))
+        labels.append(samples.labels[rows, 0])
+    return TransientPlane.fit(np.concatenate(features), np.concatenate(labels), "window")
 
 
 def _statistics(known: Shares, seed: int) -> PoseStatistics:
