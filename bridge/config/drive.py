@@ -27,8 +27,8 @@ class DriveConfig(Section):
     script: Literal["zero", "walk", "push", "fall"] = "walk"
     """What the person does to the walker: nothing, walk along, be pushed sideways, or fall into the harness."""
 
-    walk_force_n: float = Field(default=12.0, ge=0, le=200)
-    """Mean forward push of a walking person [N]; assumed."""
+    walk_force_n: float = Field(default=24.0, ge=0, le=200)
+    """Mean forward push of a walking person [N]; assumed: keeps 0.8 m/s against 30 N s/m of damping."""
 
     walk_lean_n: float = Field(default=30.0, ge=0, le=200)
     """Mean downward lean of a walking person [N]; assumed."""
