@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -130,10 +131,13 @@ class ControllerNode:
         odometry, wrench = self._intervention.odometry, self._intervention.wrench
         assert odometry is not None
         assert wrench is not None  # both by decision.stop being false
+        started_ns = self._context.clock.now_ns()
         try:
             if not self._running:
                 self._controller.reset()
             command = self._controller.step(now_ns, odometry, wrench, decision)
+            # by the node's clock, not the solver's: in simulated time nothing depends on how long the machine took
+            command = replace(command, solve_time_s=(self._context.clock.now_ns() - started_ns) / NS)
         except Exception as error:  # noqa: BLE001 (whatever it is, the loop must go on and the base must brake)
             failure = f"controller failed: {type(error).__name__}: {error}"
         took_s = (self._context.clock.now_ns() - now_ns) / NS
