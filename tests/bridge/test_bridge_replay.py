@@ -61,8 +61,6 @@ def replayed(path: Path, roles: list[str], **options: dict[str, str]) -> list[tu
 
 ROLES = [
     pytest.param(["controller"], {"controller": {"controller": "log"}}, id="controller=log"),
-    pytest.param(["controller"], {"controller": {"controller": "mpc"}}, id="controller=mpc"),
-    pytest.param(["anticipation"], {}, id="anticipation"),
     pytest.param(["anticipation", "controller"], {"controller": {"controller": "mpc"}}, id="both"),
 ]
 
