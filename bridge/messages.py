@@ -45,15 +45,22 @@ class GaitState(StrEnum):
 
 
 def frozen(array: object, shape: tuple[int, ...], name: str) -> Floats:
-    """Return `array` as a read-only float64 copy of `shape`.
+    """Return `array` as a read-only float64 array of `shape` that nobody else can write.
+
+    What this function returned before is returned as it is: messages are copied with `replace` at every hop.
 
     Raises:
         InvalidMessage: the size does not fit.
     """
+    if isinstance(array, np.ndarray) and array.shape == shape and array.dtype == np.float64:
+        flags = array.flags
+        if flags.owndata and not flags.writeable:
+            return array
     value = np.array(array, dtype=np.float64)
     if value.size != math.prod(shape):
         raise InvalidMessage(f"{name} has shape {value.shape}, expected {shape}")
-    value = value.reshape(shape)
+    if value.shape != shape:
+        value = value.reshape(shape).copy()
     value.flags.writeable = False
     return value
 

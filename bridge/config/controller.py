@@ -18,8 +18,8 @@ class ControllerConfig(Section):
     rate_hz: float = Field(default=100.0, ge=20, le=1000)
     """Rate of the loop [Hz]."""
 
-    overrun_s: float = Field(default=0.02, gt=0, le=0.05)
-    """A command that took longer to compute than this is replaced by the safe command [s]."""
+    overrun_s: float = Field(default=0.04, gt=0, le=0.05)
+    """A command that took longer to compute than this is replaced by the safe command [s]; the drive waits 60 ms."""
 
     log: str = ""
     """File of the logging mock (JSON lines); "" = keep the records in memory only."""
