@@ -113,7 +113,7 @@ def evaluate(
 def _console() -> Console:
     """A terminal as it is; a file or a pipe wide enough for the tables."""
     console = Console()
-    return console if console.is_terminal else Console(width=110)
+    return console if console.is_terminal else Console(width=140)
 
 
 def _one_thread() -> None:

@@ -37,7 +37,7 @@ def show(outcome: Outcome, protocol: str, console: Console) -> None:
         rows = {name: [getattr(part, kind) for part in parts] for name, parts in outcome.errors.items()}
         _table(console, f"Forecast error, relative coordinates, {escape(title)}", ERROR_STEPS, rows)
     if outcome.alarms:
-        table = Table(title=f"Windows without a fall in which p(fall) at 500 ms > {ALARM}, never learnt from")
+        table = Table(title=f"Windows without a fall in which p(fall) at 500 ms > {ALARM}, recordings not learnt from")
         for column in ("motion", "alarms", "windows", "share"):
             table.add_column(column, justify="left" if column == "motion" else "right")
         for name, (alarms, windows) in _totals(outcome).items():
@@ -74,11 +74,11 @@ def _table(console: Console, title: str, steps: Sequence[int], rows: dict[str, l
     table = Table(title=title)
     table.add_column("", no_wrap=True)
     for step in steps:
-        table.add_column(f"{round(1000 * step * STEP_S)} ms", justify="right", no_wrap=True)
+        table.add_column(f"{round(1000 * step * STEP_S)} ms", justify="right")
     for name, parts in rows.items():
         mean, spread = np.nanmean(parts, axis=0), np.nanstd(parts, axis=0)
         digits = 1 if mean.max() > 2 else 3
-        cells = [f"{a:.{digits}f}±{b:.{digits}f}" for a, b in zip(mean, spread, strict=True)]
+        cells = [f"{a:.{digits}f} ± {b:.{digits}f}" for a, b in zip(mean, spread, strict=True)]
         table.add_row(name, *cells)
     console.print(table)
 
