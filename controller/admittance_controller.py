@@ -101,6 +101,7 @@ class AdmittanceController:
         """Forget the past: the next step starts from the measured motion."""
         self._admittance.reset()
         self._predictive.reset()
+        self._motion.rest()
         self._started = False
         self._last_ns: int | None = None
         self._last_solved_ns = 0
@@ -135,6 +136,7 @@ class AdmittanceController:
             state=decision.state,
             solver=choice.solver,
             lifetime_s=self._lifetime_s,
+            valid=self._started,  # without a motion to start from, holding is all that can be asked for
             reason="; ".join(reason for reason in reasons if reason),
             rests_on_ns=decision.rests_on_ns,
             fall_distance=decision.fall_distance,
@@ -182,6 +184,9 @@ class AdmittanceController:
     def _choose(self, now_ns: int, inputs: _Inputs, decision: Decision) -> _Choice:
         """Return what the best law that can be had asks for."""
         motion = self._motion
+        stop = stop_acceleration(motion.velocity, self._limits, inputs.span_s)
+        if not self._started:
+            return _Choice("stop", stop, None, "no usable odometry yet")
         height_m = float(motion.pose[3])
         terms = self._walker.evaluate(height_m, motion.velocity)
         if not abs(height_m - self._linearised_at_m) <= _RELINEARISE_M:
@@ -194,10 +199,9 @@ class AdmittanceController:
         def allowed(wanted: Floats) -> Floats:
             return within_machine(wanted, give_way, self._machine.rows, bounds)
 
-        stop = stop_acceleration(motion.velocity, self._limits, inputs.span_s)
-        if decision.stop or not self._started:
+        if decision.stop:
             self._admittance.release()
-            return _Choice("stop", allowed(stop), None, "" if decision.stop else "no usable odometry yet")
+            return _Choice("stop", allowed(stop), None)
 
         force = wrenches @ terms.interface + self._fading[:, None] * inputs.draw
         law = self._admittance.stages(inputs.profile, motion.pose, motion.velocity, force[0])

@@ -37,7 +37,11 @@ class CommandedMotion:
         self._pose_rate = config.pose_rate_per_s
         self._limits = limits
         self._stroke_m = stroke_m
-        self.pose: Floats = np.zeros(4)
+        self.rest()
+
+    def rest(self) -> None:
+        """Forget the past: at rest, nobody knows where."""
+        self.pose: Floats = np.array([0.0, 0.0, 0.0, 0.5 * (self._stroke_m[0] + self._stroke_m[1])])
         self.velocity: Floats = np.zeros(4)
         self.acceleration: Floats = np.zeros(4)
 

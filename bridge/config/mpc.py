@@ -39,7 +39,7 @@ class MpcConfig(Section):
     accuracy: float = Field(default=1e-5, gt=0, le=1e-2)
     """Absolute and relative accuracy asked of the solver, in scaled units (1 = the machine's limit)."""
 
-    residual_max: float = Field(default=1e-3, gt=0, le=1e-1)
+    residual_max: float = Field(default=1e-4, gt=0, le=1e-1)
     """Largest primal or dual residual, by our own count, with which a plan is accepted (scaled units)."""
 
     fallback_max_s: float = Field(default=0.2, ge=0, le=5)

@@ -15,17 +15,19 @@ from controller.mpc.problem import Problem
 from controller.mpc.structure import Structure
 
 _SOLVED = 1
-_REASONS = {
+# Statuses that come with an answer. Whether it is a plan is decided by our own residuals.
+_ANSWERED = {
+    _SOLVED: "the solver is done",
     2: "the solver stopped short of its accuracy",
+    7: "the solver reached its iteration limit",
+    8: "the solver reached its time limit",
+}
+_REASONS = {
     3: "the problem has no feasible motion",
     4: "the problem has no feasible motion",
     5: "the problem is unbounded",
     6: "the problem is unbounded",
-    7: "the solver reached its iteration limit",
-    8: "the solver reached its time limit",
 }
-# After these the iterates are rays or worse: a warm start from them poisons every later solve.
-_POISONED = frozenset({3, 4, 5, 6, 9, 11})
 
 
 class Solver(Protocol):
@@ -65,20 +67,27 @@ class OsqpSolver:
         info = result.info
         status = int(info.status_val)
         spent = float(info.run_time)
-        if status != _SOLVED:
-            self._stale = status in _POISONED
-            reason = _REASONS.get(status, "the solver failed")
-            return Failure(reason, str(info.status), int(info.iter), solve_time_s=spent)
+        iterations = int(info.iter)
+
+        def failure(reason: str, residuals: Residuals | None = None) -> Failure:
+            return Failure(reason, str(info.status), iterations, residuals, spent)
+
+        if status not in _ANSWERED:
+            # The iterates are rays or worse: a warm start from them would poison every later solve.
+            self._stale = True
+            return failure(_REASONS.get(status, "the solver failed"))
         x, y = np.asarray(result.x), np.asarray(result.y)
         if not (np.isfinite(x).all() and np.isfinite(y).all()):
             self._stale = True
-            return Failure("the solver's answer is not finite", str(info.status), int(info.iter), solve_time_s=spent)
+            return failure("the solver's answer is not finite")
         residuals = self._residuals(problem, x, y)
-        if max(residuals) > self._config.residual_max:
-            self._stale = True
-            reason = f"the solver's answer is off by {max(residuals):.1e}, limit {self._config.residual_max:.1e}"
-            return Failure(reason, str(info.status), int(info.iter), residuals, spent)
-        return decode(self._structure, x, residuals, int(info.iter), spent)
+        worst, limit = max(residuals), self._config.residual_max
+        if worst > limit:
+            # Said to be solved and is not: something is wrong with the workspace.
+            self._stale = status == _SOLVED
+            off = f"the answer is off by {worst:.1e}, limit {limit:.1e}"
+            return failure(f"{_ANSWERED[status]}, {off}" if status != _SOLVED else off, residuals)
+        return decode(self._structure, x, residuals, iterations, spent)
 
     def _setup(self, problem: Problem) -> None:
         config, structure = self._config, self._structure
