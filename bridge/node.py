@@ -8,6 +8,8 @@ import logging
 import os
 import signal
 import sys
+import threading
+import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
@@ -94,7 +96,7 @@ def main(role: str, factory: Factory, arguments: Sequence[str] | None = None) ->
         transport = ZenohTransport(config.bridge, role, clock)
         try:
             context = NodeContext(config, transport, clock, logging.getLogger(role), options, path, tuple(parsed.set))
-            _serve(role, factory, context, stop)
+            _serve(role, factory, context, stop, parsed.after)
         finally:
             transport.close()
     except SurefootError as error:
@@ -103,9 +105,10 @@ def main(role: str, factory: Factory, arguments: Sequence[str] | None = None) ->
     return 0
 
 
-def _serve(role: str, factory: Factory, context: NodeContext, stop: _StopFlag) -> None:
+def _serve(role: str, factory: Factory, context: NodeContext, stop: _StopFlag, after: Sequence[str]) -> None:
     node = factory(context)
     try:
+        await_roles(context.transport, after, context.config.launch.ready_timeout_s, lambda: stop.set)
         diagnostics = Outbox(context.transport, DIAGNOSTICS)
         context.transport.declare_alive(role)
         gc.collect()
@@ -113,6 +116,28 @@ def _serve(role: str, factory: Factory, context: NodeContext, stop: _StopFlag) -
         _loop(node, diagnostics, context.clock, stop)
     finally:
         node.close()
+
+
+def await_roles(transport: Transport, roles: Sequence[str], timeout_s: float, stop: Callable[[], bool]) -> bool:
+    """Wait until all `roles` are on the wire, at most `timeout_s`; return whether they are."""
+    if not roles:
+        return True
+    missing, complete = set(roles), threading.Event()
+
+    def note(role: str, alive: bool) -> None:
+        if alive:
+            missing.discard(role)
+        if not missing:
+            complete.set()
+
+    handle = transport.watch_alive(note)
+    try:
+        end_s = time.monotonic() + timeout_s
+        while not (complete.wait(0.05) or stop() or time.monotonic() > end_s):
+            pass
+    finally:
+        handle.close()
+    return complete.is_set()
 
 
 def _loop(node: Node, diagnostics: Outbox, clock: Clock, stop: _StopFlag) -> None:
@@ -141,6 +166,9 @@ def _parse(role: str, arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--config", default="", help="configuration file (TOML)")
     parser.add_argument("--set", action="append", default=[], metavar="SECTION.KEY=VALUE", help="override one value")
     parser.add_argument("--option", action="append", default=[], metavar="NAME=VALUE", help="option of this role")
+    parser.add_argument(
+        "--after", action="append", default=[], metavar="ROLE", help="wait for this role before the first turn"
+    )
     return parser.parse_args(arguments)
 
 

@@ -38,7 +38,7 @@ class LaunchConfig(Section):
     """How long a process may take to stop before it is killed [s]."""
 
     ready_timeout_s: float = Field(default=30.0, gt=0, le=600)
-    """Perception starts once the others are up, so that none misses the start of a file, or after this long [s]."""
+    """Perception begins once the others are up, so that none misses the start of a file, or after this long [s]."""
 
     log_dir: str = Field(default="runs/logs", min_length=1)
     """Folder for what the processes write, one `ROLE.log` each; older text moves to `ROLE.log.1`."""

@@ -20,6 +20,7 @@ from bridge.errors import ConfigError, SurefootError
 from bridge.launch.logfile import LogFile
 
 BAD_INPUT = SurefootError.exit_code
+SOURCE = "perception"
 
 
 class Phase(StrEnum):
@@ -86,7 +87,12 @@ class Launcher:
         self._children = {
             role: _Child(
                 role,
-                [self._launch.modules[role], *common, *_option_words(given.get(role, {}))],
+                [
+                    self._launch.modules[role],
+                    *common,
+                    *_option_words(given.get(role, {})),
+                    *_after_words(role, self._launch.roles),
+                ],
                 LogFile(folder, role),
             )
             for role in self._launch.roles
@@ -198,6 +204,11 @@ class _Child:
         line = self._log.last_line(prefix) or self._log.last_line()
         pid = self._process.pid if self._process is not None else 0
         return ProcessState(self.role, pid, alive, self.total_restarts, self._exit_code, line, self.phase)
+
+
+def _after_words(role: str, roles: Iterable[str]) -> list[str]:
+    """What the source publishes is lost on those that do not listen yet, so it waits for them."""
+    return [word for other in roles if other != SOURCE for word in ("--after", other)] if role == SOURCE else []
 
 
 def _option_words(options: Mapping[str, str]) -> list[str]:

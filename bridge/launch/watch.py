@@ -12,12 +12,11 @@ from bridge.clock import SystemClock
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import SurefootError
 from bridge.launch.display import Display
-from bridge.launch.launcher import Launcher, Phase, ProcessState
+from bridge.launch.launcher import SOURCE, Launcher, Phase, ProcessState
 from bridge.launch.monitor import Monitor, View
 from bridge.messages import GaitState
 from bridge.transport.zenoh import ZenohTransport
 
-SOURCE = "perception"  # what it publishes is lost on those that do not listen yet
 POLL_S: Final = 0.05
 SETTLE_LIMIT_S: Final = 2.0  # the safe command is due 0.2 s after the last horizon
 AT_REST: Final = (GaitState.SAFE_STOP, GaitState.DISARMED)
@@ -63,7 +62,7 @@ def watch_over(launcher: Launcher, config: SurefootConfig, display: Display, lim
     with StopSignals() as stop, display:
         transport = ZenohTransport(config.bridge, "monitor", clock)
         try:
-            watch = Watch(launcher, Monitor(transport, clock), config, limits)
+            watch = Watch(launcher, Monitor(transport, clock), limits)
             while not (reason := watch.turn(stop.seen)):
                 display.show(watch.elapsed_s, watch.processes, watch.view)
                 if watch.news:
@@ -78,18 +77,16 @@ def watch_over(launcher: Launcher, config: SurefootConfig, display: Display, lim
 
 
 class Watch:
-    """What `watch_over` knows from one turn to the next: which process to start, and when it is time to end."""
+    """What `watch_over` knows from one turn to the next: how everything is, and when it is time to end."""
 
-    def __init__(self, launcher: Launcher, monitor: Monitor, config: SurefootConfig, limits: Limits) -> None:
+    def __init__(self, launcher: Launcher, monitor: Monitor, limits: Limits) -> None:
         self._launcher, self._monitor, self._limits = launcher, monitor, limits
-        self._ready_timeout_s = config.launch.ready_timeout_s
-        self._others = [role for role in config.launch.roles if role != SOURCE]
         self._started_s = time.monotonic()
         self._source_ended_s: float | None = None
         self.news = ""
         self.processes: Mapping[str, ProcessState] = {}
         self.view: View = monitor.look()
-        launcher.start(self._others)
+        launcher.start()
 
     @property
     def elapsed_s(self) -> float:
@@ -108,21 +105,11 @@ class Watch:
         if self._limits.duration_s is not None and self.elapsed_s >= self._limits.duration_s:
             return f"stopped after {self._limits.duration_s:g} s, as asked"
         source = self.processes.get(SOURCE)
-        if source is not None and source.phase is Phase.WAITING and self._others_ready():
-            self._launcher.start([SOURCE])
-            self.news = f"{SOURCE} starts"
-            return ""
         if not any(process.alive for process in self.processes.values()):
             return "no process is left running"
         if source is not None and source.phase is Phase.FINISHED and not self._limits.keep_running:
             return self._after_source()
         return ""
-
-    def _others_ready(self) -> bool:
-        """Whether every process that may still come up has said on the wire that it is there."""
-        there = {role for role, seen in self.view.roles.items() if seen.alive}
-        ready = all(role in there or not self.processes[role].alive for role in self._others)
-        return ready or self.elapsed_s > self._ready_timeout_s
 
     def _after_source(self) -> str:
         """Let the controller be seen going safe before everything ends."""

@@ -232,9 +232,8 @@ class PaperLauncher:
         self.phases = dict.fromkeys(roles, Phase.WAITING)
         self.lines: dict[str, str] = {}
 
-    def start(self, roles: Iterable[str]) -> None:
-        for role in roles:
-            self.phases[role] = Phase.RUNNING
+    def start(self) -> None:
+        self.phases = dict.fromkeys(self.phases, Phase.RUNNING)
 
     def poll(self) -> dict[str, ProcessState]:
         return {role: process(role, phase, last_line=self.lines.get(role, "")) for role, phase in self.phases.items()}
@@ -243,37 +242,9 @@ class PaperLauncher:
 class TestWatch:
     ROLES = ("perception", "anticipation", "controller")
 
-    def begin(self, limits: Limits | None = None, *overrides: str) -> tuple[World, PaperLauncher, Watch]:
-        config = load_config(None, [f"launch.roles={json.dumps(self.ROLES)}", *overrides])
+    def begin(self, limits: Limits | None = None) -> tuple[World, PaperLauncher, Watch]:
         world, launcher = World(), PaperLauncher(*self.ROLES)
-        return world, launcher, Watch(launcher, world.monitor, config, limits or Limits())  # type: ignore[arg-type]
-
-    def test_source_starts_when_the_others_listen(self) -> None:
-        world, launcher, watch = self.begin()
-        assert launcher.phases == {
-            "perception": Phase.WAITING,
-            "anticipation": Phase.RUNNING,
-            "controller": Phase.RUNNING,
-        }
-        world.rise("anticipation")
-        assert watch.turn(None) == ""
-        assert launcher.phases["perception"] is Phase.WAITING
-        world.rise("controller")
-        assert watch.turn(None) == ""
-        assert launcher.phases["perception"] is Phase.RUNNING
-        assert watch.news == "perception starts"
-
-    def test_source_does_not_wait_for_the_dead(self) -> None:
-        world, launcher, watch = self.begin()
-        world.rise("anticipation")
-        launcher.phases["controller"] = Phase.FAILED
-        watch.turn(None)
-        assert launcher.phases["perception"] is Phase.RUNNING
-
-    def test_source_does_not_wait_for_ever(self) -> None:
-        _, launcher, watch = self.begin(None, "launch.ready_timeout_s=1e-9")
-        watch.turn(None)
-        assert launcher.phases["perception"] is Phase.RUNNING
+        return world, launcher, Watch(launcher, world.monitor, limits or Limits())  # type: ignore[arg-type]
 
     def running(self, limits: Limits | None = None) -> tuple[World, PaperLauncher, Watch]:
         world, launcher, watch = self.begin(limits)
