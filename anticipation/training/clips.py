@@ -96,7 +96,7 @@ def load_arrays(path: Path) -> Arrays:
         SourceError: the file is damaged; later, when an array is asked for that is not in it.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             return Arrays(path, {name: np.asarray(archive[name], dtype=np.float64) for name in archive.files})
     except (OSError, ValueError, EOFError, zlib.error, BadZipFile) as error:
         raise SourceError(f"research data '{path}' cannot be read: {error}") from error

@@ -61,16 +61,16 @@ QUICK: Final = {
         mocap_clips=8,
         pretrain=Recipe(epochs=2, draws=128, batch=64),
         finetune=Recipe(epochs=2, draws=128, batch=64),
-        classifier=Recipe(epochs=5, draws=160, batch=32, rate=3e-3),
-        baseline=Recipe(epochs=5, draws=160, batch=32, rate=3e-3),
+        classifier=Recipe(epochs=8, draws=192, batch=32, rate=3e-3),
+        baseline=Recipe(epochs=2, draws=128, batch=32, rate=3e-3),
     ),
     "lstm": Plan(
         forecaster="lstm",
         mocap_clips=8,
         pretrain=Recipe(epochs=1, draws=64, batch=32),
         finetune=Recipe(epochs=1, draws=64, batch=32),
-        classifier=Recipe(epochs=5, draws=160, batch=32, rate=3e-3),
-        baseline=Recipe(epochs=5, draws=160, batch=32, rate=3e-3),
+        classifier=Recipe(epochs=8, draws=192, batch=32, rate=3e-3),
+        baseline=Recipe(epochs=2, draws=128, batch=32, rate=3e-3),
     ),
 }
 
