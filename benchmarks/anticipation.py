@@ -72,41 +72,58 @@ def untrained() -> Checkpoint:
     )
 
 
-def timed(action: Callable[[], Any], times: int) -> list[float]:
-    """Durations of `times` calls [ms], after a few that do not count."""
+class Took:
+    """Durations by the wall's clock and on the core [ms]: on a busy machine the second is nearer to an idle one's."""
+
+    def __init__(self) -> None:
+        self.wall: list[float] = []
+        self.core: list[float] = []
+
+    def start(self) -> None:
+        """Begin a turn."""
+        self._core_ns, self._wall_ns = time.thread_time_ns(), time.perf_counter_ns()
+
+    def stop(self) -> None:
+        """End a turn."""
+        wall_ns, core_ns = time.perf_counter_ns(), time.thread_time_ns()
+        self.wall.append((wall_ns - self._wall_ns) / 1e6)
+        self.core.append((core_ns - self._core_ns) / 1e6)
+
+    def table(self) -> dict[str, dict[str, float]]:
+        """Percentiles of both."""
+        return {"wall": percentiles(self.wall), "core": percentiles(self.core)}
+
+
+def timed(action: Callable[[], Any], times: int) -> Took:
+    """Time `times` calls, after a few that do not count."""
     for _ in range(10):
         action()
-    took = []
+    took = Took()
     for _ in range(times):
-        start = time.perf_counter_ns()
+        took.start()
         action()
-        took.append((time.perf_counter_ns() - start) / 1e6)
+        took.stop()
     return took
 
 
-def step_durations(checkpoint: Checkpoint, frames: int) -> dict[str, list[float]]:
-    """Durations of cleaning and of the whole step, and the step's time on the core, for each frame [ms].
-
-    On a machine that does other work the time on the core is nearer to what an idle one would show.
-    """
+def step_durations(checkpoint: Checkpoint, frames: int) -> dict[str, Took]:
+    """Time cleaning, and the whole step, for each frame after the first two seconds."""
     cleaner = Cleaner(CleaningConfig())
     predictor = Predictor(checkpoint, AnticipationConfig(min_quality=0.0))
     predictor.warm_up()
-    took: dict[str, list[float]] = {"cleaning": [], "whole step": [], "whole step, time on the core": []}
-    for number, frame in enumerate(detections(frames)):
-        stamp_ns = round((1 + number / 30) * NS)
-        start_on_core, start = time.thread_time_ns(), time.perf_counter_ns()
-        ticks = cleaner.push(frame, stamp_ns)
-        cleaned = time.perf_counter_ns()
+    cleaning, whole = Took(), Took()
+    for number, frame in enumerate(detections(frames + 60)):
+        if number == 60:
+            cleaning, whole = Took(), Took()
+        whole.start()
+        cleaning.start()
+        ticks = cleaner.push(frame, round((1 + number / 30) * NS))
+        cleaning.stop()
         for tick in ticks:
             predictor.push(as_message(tick))
-        horizon = predictor.predict()
-        end, end_on_core = time.perf_counter_ns(), time.thread_time_ns()
-        if horizon is not None and horizon.valid and number > 60:
-            spans = (cleaned - start, end - start, end_on_core - start_on_core)
-            for name, span in zip(took, spans, strict=True):
-                took[name].append(span / 1e6)
-    return took
+        predictor.predict()
+        whole.stop()
+    return {"cleaning": cleaning, "whole step": whole}
 
 
 def as_message(tick: CleanFrame) -> Keypoints:
@@ -142,7 +159,7 @@ def measure(checkpoint: Checkpoint, times: int) -> dict[str, Any]:
             "LSTM direct, eager": timed(lambda: lstm(window), times // 4),
             "LSTM direct + 16 windows, eager": timed(lambda: (lstm(window), classifier(windows)), times // 4),
         }
-    table = {name: percentiles(took) for name, took in parts.items()}
+    table = {name: took.table() for name, took in parts.items()}
     name = forecast if isinstance(forecast, str) else type(forecast).__name__
     return {
         "machine": machine(),
@@ -155,9 +172,9 @@ def measure(checkpoint: Checkpoint, times: int) -> dict[str, Any]:
     }
 
 
-def ratio(table: dict[str, dict[str, float]], slow: str, quick: str) -> float:
-    """How many times faster, by the medians."""
-    return round(table[slow]["p50_ms"] / table[quick]["p50_ms"], 2)
+def ratio(table: dict[str, dict[str, dict[str, float]]], slow: str, quick: str) -> float:
+    """How many times less time on the core, by the medians."""
+    return round(table[slow]["core"]["p50_ms"] / table[quick]["core"]["p50_ms"], 2)
 
 
 def main() -> None:
