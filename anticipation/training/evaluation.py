@@ -29,7 +29,7 @@ NAIVE: Final[dict[str, Forecast]] = {"zero velocity": zero_velocity, "constant v
 class Outcome:
     """What the test parts of all folds gave; one entry a fold."""
 
-    shipped: str  # name of the row that is shipped
+    shipped: str  # name of the row made as the shipped checkpoint is
     scores: dict[str, list[Score]] = field(default_factory=dict)
     errors: dict[str, list[ForecastError]] = field(default_factory=dict)
     alarms: dict[str, list[tuple[int, int]]] = field(default_factory=dict)  # kind of motion: alarms, windows
@@ -94,7 +94,7 @@ def predict(classifier: nn.Module, forecast: Forecast, samples: Samples) -> NDAr
 
 
 def _shipped(plan: Plan) -> str:
-    return f"{plan.forecaster} + DGNN (shipped)"
+    return f"{plan.forecaster} + DGNN on forecasts"
 
 
 def _fit(pretrained: nn.Module, plan: Plan, known: Shares, name: str, progress: Progress) -> Models:
