@@ -93,6 +93,11 @@ class AdmittanceController:
         self.reset()
 
     @property
+    def predictive_law(self) -> PredictiveLaw:
+        """The MPC behind the commands."""
+        return self._predictive
+
+    @property
     def tank_energy_j(self) -> float:
         """Energy that stiffening may still spend [J]."""
         return self._admittance.tank.energy_j
@@ -184,26 +189,29 @@ class AdmittanceController:
     def _choose(self, now_ns: int, inputs: _Inputs, decision: Decision) -> _Choice:
         """Return what the best law that can be had asks for."""
         motion = self._motion
-        stop = stop_acceleration(motion.velocity, self._limits, inputs.span_s)
         if not self._started:
-            return _Choice("stop", stop, None, "no usable odometry yet")
+            return _Choice("stop", np.zeros(4), None, "no usable odometry yet")
         height_m = float(motion.pose[3])
         terms = self._walker.evaluate(height_m, motion.velocity)
         if not abs(height_m - self._linearised_at_m) <= _RELINEARISE_M:
             self._machine.linearise(terms)
             self._linearised_at_m = height_m
-        wrenches = self._fading[:, None] * inputs.wrench
-        bounds = self._machine.bounds(terms, wrenches)
-        give_way = self._machine.give_way(terms, wrenches, bounds)
+        bounds = self._machine.bounds(terms, inputs.wrench, self._fading)
+        give_way = self._machine.give_way(terms, inputs.wrench, bounds)
 
         def allowed(wanted: Floats) -> Floats:
             return within_machine(wanted, give_way, self._machine.rows, bounds)
 
-        if decision.stop:
+        def stop(reason: str = "", solve_time_s: float = 0.0) -> _Choice:
+            # The spring is let go: stiffening anew anchors it where the walker comes to rest.
             self._admittance.release()
-            return _Choice("stop", allowed(stop), None)
+            wanted = stop_acceleration(motion.velocity, self._limits, inputs.span_s)
+            return _Choice("stop", allowed(wanted), None, reason, solve_time_s)
 
-        force = wrenches @ terms.interface + self._fading[:, None] * inputs.draw
+        if decision.stop:
+            return stop()
+
+        force = self._fading[:, None] * (inputs.wrench @ terms.interface + inputs.draw)
         law = self._admittance.stages(inputs.profile, motion.pose, motion.velocity, force[0])
         instant = Instant(law, force, motion.velocity, motion.acceleration, height_m, bounds, give_way)
         failure = Failure("", "")
@@ -216,10 +224,9 @@ class AdmittanceController:
             failure = outcome
         without_s = seconds(now_ns - self._last_solved_ns)
         if without_s > self._config.fallback_max_s:
-            self._admittance.release()
             reason = f"no plan for {without_s * 1e3:.0f} ms, limit {self._config.fallback_max_s * 1e3:.0f}"
             reason = f"{failure.reason}; {reason}" if failure.reason else reason
-            return _Choice("stop", allowed(stop), None, reason, failure.solve_time_s)
+            return stop(reason, failure.solve_time_s)
         wanted = fallback_acceleration(law, force[0], motion.velocity, self._period_s)
         return _Choice("fallback", allowed(wanted), instant, failure.reason, failure.solve_time_s)
 

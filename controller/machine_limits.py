@@ -59,6 +59,9 @@ class MachineLimits:
         self._traction_map: Floats = np.stack([np.cos(angles), np.sin(angles)], axis=1) / (
             config.friction_coefficient * self._weight * np.cos(np.pi / 8)
         )
+        self._drive_map: Floats = np.zeros((8, 3))
+        self._drive_map[WHEEL_ROWS] = self._wheel_map
+        self._drive_map[TRACTION_ROWS, :2] = self._traction_map
         self.rows: Floats = np.zeros((ROWS, 4))
         self._edges: Floats = np.zeros((4, 3))
         for edge in range(4):
@@ -74,49 +77,56 @@ class MachineLimits:
         self.rows[TRACTION_ROWS] = self._traction_map @ floor[:2]
         self.rows[TIP_ROWS] = self._edges @ ground_moments(terms, self._weight).by_acceleration
 
-    def bounds(self, terms: WalkerTerms, wrench: Floats) -> MachineBounds:
-        """Return the limits under `wrench` (stages, 6): force [N], then torque [N m], at the interface."""
-        stages = wrench.shape[0]
-        load = terms.bias - wrench @ terms.interface  # (stages, 4), what the drives must carry at rest
-        low = np.empty((stages, ROWS))
-        high = np.empty((stages, ROWS))
-        torque = load[:, :3] @ self._wheel_map.T
-        low[:, WHEEL_ROWS] = -1.0 - torque
-        high[:, WHEEL_ROWS] = 1.0 - torque
+    def bounds(self, terms: WalkerTerms, wrench: Floats, fading: Floats) -> MachineBounds:
+        """Return the limits at instants at which `fading` (stages,) of `wrench` is left.
+
+        Args:
+            terms: the model now.
+            wrench: (6,) force [N], then torque [N m], at the interface.
+            fading: (stages,) from 0 to 1.
+        """
+        left = fading[:, None]
+        push = wrench @ terms.interface
+        # What each row would carry at no acceleration, without the person and by the person.
+        alone, by_person = self._drive_map @ terms.bias[:3], self._drive_map @ push[:3]
+        carried = alone - left * by_person
         # The column's own acceleration may take this much load off the floor; less than none grips nothing.
-        grip = np.maximum((self._weight - wrench[:, 2:3] - self._shifting) / self._weight, 0.0)
-        slip = load[:, :2] @ self._traction_map.T
-        low[:, TRACTION_ROWS] = -grip - slip
-        high[:, TRACTION_ROWS] = grip - slip
+        grip = np.maximum((self._weight - self._shifting - left * wrench[2]) / self._weight, 0.0)
         _, bias, by_wrench = ground_moments(terms, self._weight)
+        stages = len(fading)
+        low, high = np.empty((stages, ROWS)), np.empty((stages, ROWS))
+        low[:, WHEEL_ROWS] = -1.0
+        low[:, TRACTION_ROWS] = -grip
+        np.negative(low[:, DRIVE_ROWS], out=high[:, DRIVE_ROWS])
+        low[:, DRIVE_ROWS] -= carried
+        high[:, DRIVE_ROWS] -= carried
         low[:, TIP_ROWS] = -np.inf
-        high[:, TIP_ROWS] = -(bias + wrench @ by_wrench.T) @ self._edges.T
-        box_low = np.tile(-self._acceleration, (stages, 1))
-        box_high = -box_low
-        inertia = terms.mass[3, 3]
-        box_low[:, 3] = np.clip(
-            (-self._column_force - load[:, 3]) / inertia, -self._acceleration[3], self._acceleration[3]
-        )
-        box_high[:, 3] = np.clip(
-            (self._column_force - load[:, 3]) / inertia, -self._acceleration[3], self._acceleration[3]
-        )
+        high[:, TIP_ROWS] = -(self._edges @ bias) - left * (self._edges @ (by_wrench @ wrench))
+        inertia, most = terms.mass[3, 3], self._acceleration[3]
+        load = terms.bias[3] - fading * push[3]
+        box_low, box_high = np.empty((stages, 4)), np.empty((stages, 4))
+        box_low[:], box_high[:] = -self._acceleration, self._acceleration
+        box_low[:, 3] = np.minimum(np.maximum((-self._column_force - load) / inertia, -most), most)
+        box_high[:, 3] = np.minimum(np.maximum((self._column_force - load) / inertia, -most), most)
         return MachineBounds(low, high, box_low, box_high)
 
     def give_way(self, terms: WalkerTerms, wrench: Floats, bounds: MachineBounds) -> Floats:
-        """Return the (4,) acceleration nearest to rest that the machine can hold under the first of `wrench`.
+        """Return the (4,) acceleration nearest to rest that the machine can hold under the present `wrench` (6,).
 
         Zero in all ordinary cases. Where the person pushes harder than wheels or floor can resist it gives way
         until they can; where the push would tip the walker it moves under the push.
         """
         low, high = bounds.low[0], bounds.high[0]
         value = np.zeros(4)
+        value[3] = min(max(0.0, float(bounds.box_low[0, 3])), float(bounds.box_high[0, 3]))
+        if (low <= 0.0).all() and (high >= 0.0).all():
+            return value
         middle = 0.5 * (low[DRIVE_ROWS] + high[DRIVE_ROWS])
         width = 0.5 * (high[DRIVE_ROWS] - low[DRIVE_ROWS])
         ratio = float(np.max(np.abs(middle) / np.maximum(width, 1e-3)))
         if ratio > 1.0:
-            yielding = np.linalg.solve(terms.mass[:3, :3], (wrench[0] @ terms.interface - terms.bias)[:3])
+            yielding = np.linalg.solve(terms.mass[:3, :3], (wrench @ terms.interface - terms.bias)[:3])
             value[:3] = (1.0 - 1.0 / ratio) * yielding
-        value[3] = min(max(0.0, float(bounds.box_low[0, 3])), float(bounds.box_high[0, 3]))
         for axis, fore, back in ((0, _TIP_FRONT, _TIP_REAR), (1, _TIP_LEFT, _TIP_RIGHT)):
             # Accelerating forward moves the zero-moment point back: the fore edge bounds from below.
             least, most = (

@@ -16,11 +16,12 @@ import numpy as np
 
 from bridge.messages import Floats
 from controller.admittance import AdmittanceStages
-from controller.machine_limits import TIP_ROWS, MachineBounds
+from controller.machine_limits import DRIVE_ROWS, TIP_ROWS, MachineBounds
 from controller.mpc.problem import Problem
 from controller.mpc.structure import (
+    DRIVE_SCALE,
     JERK_SCALE,
-    MACHINE_SCALE,
+    TIP_SCALE,
     VELOCITY_SCALE,
     Structure,
     acceleration_index,
@@ -40,7 +41,6 @@ class Assembly:
     def __init__(self, structure: Structure, machine_rows: Floats, stroke_m: tuple[float, float]) -> None:
         setting = structure.setting
         self._setting = setting
-        self._rows = structure.rows
         self._stroke_m = stroke_m
         N = setting.stages
         self._sparse = np.array(setting.sparse_stages)
@@ -51,12 +51,18 @@ class Assembly:
         self._q: Floats = np.array(structure.gradient(*parameters)).ravel()
         self._l: Floats = np.zeros(structure.constraints.shape[0])
         self._u: Floats = np.zeros(structure.constraints.shape[0])
+        # Lower and upper limits of each kind of row, as views of l and u.
+        self._limits = {kind: (structure.view(self._l, kind), structure.view(self._u, kind)) for kind in structure.rows}
+        self._limits["jerk"][0][:], self._limits["jerk"][1][:] = -JERK_SCALE, JERK_SCALE
+        self._limits["tip_over"][0][:] = -np.inf
         self._map_cost(structure)
         self._map_constraints(structure)
         # Instants at which a stage's acceleration may have changed: one period, then whole stages.
         self._since_previous: Floats = (setting.period_s + setting.stage_s * np.arange(N, dtype=np.float64))[:, None]
         self._weights: Floats = 1.0 / (setting.mass * setting.acceleration)
         self._per_velocity: Floats = VELOCITY_SCALE / setting.velocity
+        self._per_acceleration: Floats = 1.0 / setting.acceleration
+        self._wheel_map: Floats = np.ascontiguousarray(setting.wheel_speed.T)
         self._law: tuple[bytes, bytes] | None = None
         self._tip: Floats = machine_rows[TIP_ROWS].copy()
 
@@ -107,7 +113,7 @@ class Assembly:
         self._increments[pairs[2]] -= 1.0
 
     def _map_constraints(self, structure: Structure) -> None:
-        rows = structure.rows["machine"][:, TIP_ROWS]
+        rows = structure.rows["tip_over"]
         self._tip_positions = np.array(
             [
                 [
@@ -145,7 +151,7 @@ class Assembly:
             changed = True
         if not np.array_equal(machine_rows[TIP_ROWS], self._tip):
             self._tip[:] = machine_rows[TIP_ROWS]
-            self._A[self._tip_positions] = MACHINE_SCALE[TIP_ROWS, None] * self._tip * self._setting.acceleration
+            self._A[self._tip_positions] = TIP_SCALE * self._tip * self._setting.acceleration
             changed = True
         return changed
 
@@ -187,42 +193,49 @@ class Assembly:
         bounds: MachineBounds,
         give_way: Floats,
     ) -> None:
-        setting, rows, lower, upper = self._setting, self._rows, self._l, self._u
-        dt = setting.stage_s
+        setting, limits = self._setting, self._limits
+        dt, per_acceleration = setting.stage_s, self._per_acceleration
         # The give-way motion, at every stage.
         ramp = self._give_way_motion(give_way, velocity, previous)
-        speed = velocity + dt * np.cumsum(ramp, axis=0)
-        before = np.concatenate([velocity[None], speed[:-1]])
-        way = np.cumsum(0.5 * dt * (before + speed), axis=0)
-
-        def hard(kind: str, low: Floats | float, high: Floats | float, motion: Floats) -> None:
-            lower[rows[kind]] = np.minimum(low, motion - _OPENING)
-            upper[rows[kind]] = np.maximum(high, motion + _OPENING)
-
-        start = np.concatenate([4.0 * velocity / setting.velocity, velocity / setting.velocity])
-        first = np.concatenate([rows["velocity_dynamics"][0], rows["displacement_dynamics"][0]])
-        lower[first] = start
-        upper[first] = start
-        hard(
-            "acceleration",
-            bounds.box_low / setting.acceleration,
-            bounds.box_high / setting.acceleration,
-            ramp / setting.acceleration,
-        )
-        lower[rows["jerk"]] = -JERK_SCALE
-        upper[rows["jerk"]] = JERK_SCALE
+        speed = ramp.cumsum(axis=0)
+        speed *= dt
+        speed += velocity
+        for side in limits["velocity_dynamics"]:
+            np.multiply(velocity, 4.0 / setting.velocity, out=side[0])
+        for side in limits["displacement_dynamics"]:
+            np.divide(velocity, setting.velocity, out=side[0])
         shift = JERK_SCALE * previous / (setting.jerk * setting.period_s)
-        lower[rows["jerk"][0]] += shift
-        upper[rows["jerk"][0]] += shift
-        most = 1.0 - _RESERVE
-        hard("velocity", -VELOCITY_SCALE * most, VELOCITY_SCALE * most, speed[self._sparse] * self._per_velocity)
-        hard("wheel_speed", -most, most, speed[self._sparse, :3] @ setting.wheel_speed.T)
-        scale = setting.displacement[3]
-        low_m, high_m = self._stroke_m
-        hard("stroke", (low_m - height_m) / scale, (high_m - height_m) / scale, way[self._sparse, 3:] / scale)
-        hard(
-            "machine",
-            MACHINE_SCALE * bounds.low,
-            MACHINE_SCALE * bounds.high,
-            MACHINE_SCALE * (ramp @ machine_rows.T),
+        low, high = limits["jerk"]
+        low[0], high[0] = shift - JERK_SCALE, shift + JERK_SCALE
+        _open(
+            limits["acceleration"],
+            bounds.box_low * per_acceleration,
+            bounds.box_high * per_acceleration,
+            ramp * per_acceleration,
         )
+        most = 1.0 - _RESERVE
+        held = speed[self._sparse]
+        _open(limits["velocity"], -VELOCITY_SCALE * most, VELOCITY_SCALE * most, held * self._per_velocity)
+        _open(limits["wheel_speed"], -most, most, held[:, :3] @ self._wheel_map)
+        # Height at the stages' ends by the trapezoidal rule.
+        column = speed[:, 3]
+        way = ((column.cumsum() - 0.5 * column + 0.5 * velocity[3]) * (dt / setting.displacement[3]))[self._sparse]
+        low_m, high_m = self._stroke_m
+        scale = setting.displacement[3]
+        _open(limits["stroke"], (low_m - height_m) / scale, (high_m - height_m) / scale, way[:, None])
+        carried = ramp @ machine_rows.T
+        sparse = self._sparse
+        _open(
+            limits["drive"],
+            bounds.low[sparse, DRIVE_ROWS] * DRIVE_SCALE,
+            bounds.high[sparse, DRIVE_ROWS] * DRIVE_SCALE,
+            carried[sparse, DRIVE_ROWS] * DRIVE_SCALE,
+        )
+        np.maximum(bounds.high[:, TIP_ROWS], carried[:, TIP_ROWS] + _OPENING, out=limits["tip_over"][1])
+        limits["tip_over"][1][:] *= TIP_SCALE
+
+
+def _open(limits: tuple[Floats, Floats], low: Floats | float, high: Floats | float, motion: Floats) -> None:
+    """Write limits, opened to what a motion needs."""
+    np.minimum(low, motion - _OPENING, out=limits[0])
+    np.maximum(high, motion + _OPENING, out=limits[1])

@@ -43,6 +43,10 @@ class PredictiveLaw:
         machine: linear limits on the acceleration; its rows are read at every step.
         config: horizon, weights, solver.
         period_s: control period, for which the first acceleration is applied [s].
+
+    Attributes:
+        structure: the problem's structure.
+        last_problem: what was solved last; its arrays change with the next step.
     """
 
     def __init__(
@@ -79,7 +83,8 @@ class PredictiveLaw:
 
     def plan(self, instant: Instant) -> Plan | Failure:
         """Solve the problem of this instant."""
-        return self._solver.solve(self.problem(instant))
+        self.last_problem = self.problem(instant)
+        return self._solver.solve(self.last_problem)
 
 
 def remaining(config: MpcConfig, age_s: float) -> float:

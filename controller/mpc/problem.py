@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,11 +22,12 @@ class Problem(NamedTuple):
 
     def flaw(self) -> str:
         """Return the name of what is not a number or crossed, '' if all is well."""
-        for name in ("P", "q", "A"):
-            if not np.isfinite(getattr(self, name)).all():
+        for name, values in (("P", self.P), ("q", self.q), ("A", self.A)):
+            # A sum is finite only if every term is.
+            if not math.isfinite(values.sum()):
                 return f"{name} of the problem is not finite"
+        if (self.l <= self.u).all():
+            return ""
         if np.isnan(self.l).any() or np.isnan(self.u).any():
             return "a bound of the problem is not a number"
-        if (self.l > self.u).any():
-            return "a lower bound of the problem exceeds its upper bound"
-        return ""
+        return "a lower bound of the problem exceeds its upper bound"

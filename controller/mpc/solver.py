@@ -28,6 +28,7 @@ _REASONS = {
     5: "the problem is unbounded",
     6: "the problem is unbounded",
 }
+_NO_PUSH = 1e-9  # a multiplier this small pushes against nothing
 
 
 class Solver(Protocol):
@@ -45,6 +46,9 @@ class OsqpSolver:
         self._structure = structure
         self._config = config
         self._residuals = ResidualCheck(structure)
+        setting = structure.setting
+        scale = np.concatenate([setting.acceleration, setting.velocity, setting.displacement])
+        self._scale: Floats = np.tile(scale, (setting.stages, 1))
         self._stale = True
 
     def forget(self) -> None:
@@ -87,7 +91,7 @@ class OsqpSolver:
             self._stale = status == _SOLVED
             off = f"the answer is off by {worst:.1e}, limit {limit:.1e}"
             return failure(f"{_ANSWERED[status]}, {off}" if status != _SOLVED else off, residuals)
-        return decode(self._structure, x, residuals, iterations, spent)
+        return Plan(x.reshape(self._scale.shape) * self._scale, residuals, iterations, spent)
 
     def _setup(self, problem: Problem) -> None:
         config, structure = self._config, self._structure
@@ -105,7 +109,7 @@ class OsqpSolver:
             eps_rel=config.accuracy,
             max_iter=config.max_iterations,
             time_limit=config.time_limit_s,
-            check_termination=5,
+            check_termination=10,
             # The problem comes scaled, with rows weighted for the solver; its own scaling undoes that and
             # costs a pass over the matrices in every update. The step size adapts only after 50 iterations,
             # which ordinary steps never reach.
@@ -122,47 +126,33 @@ class ResidualCheck:
 
     def __init__(self, structure: Structure) -> None:
         cost, constraints = structure.cost, structure.constraints
-        upper = sparse.csc_matrix((np.arange(1.0, len(cost.indices) + 1), cost.indices, cost.indptr), cost.shape)
-        full = sparse.csc_matrix(upper + sparse.triu(upper, 1).T)
-        full.sort_indices()
-        self._cost_map = full.data.astype(np.int64) - 1
-        self._P = sparse.csc_matrix((np.zeros(full.nnz), full.indices, full.indptr), cost.shape)
-        self._A = sparse.csc_matrix(
-            (np.zeros(len(constraints.indices)), constraints.indices, constraints.indptr), constraints.shape
-        )
+        self._n = cost.shape[0]
+        # One product with [P A'; A 0] gives the Lagrangian's gradient and the constraints' values. Its non-zeros
+        # are numbered to find where those of P and A go.
+        count = len(cost.indices)
+        upper = sparse.csc_matrix((np.arange(1.0, count + 1), cost.indices, cost.indptr), cost.shape)
+        numbers = np.arange(count + 1.0, count + len(constraints.indices) + 1)
+        A = sparse.csc_matrix((numbers, constraints.indices, constraints.indptr), constraints.shape)
+        P = upper + sparse.triu(upper, 1).T
+        self._matrix = sparse.csr_matrix(sparse.vstack([sparse.hstack([P, A.T]), sparse.hstack([A, 0.0 * A @ A.T])]))
+        self._matrix.eliminate_zeros()
+        self._sources = self._matrix.data.astype(np.int64) - 1
         self._fresh = False
 
     def __call__(self, problem: Problem, x: Floats, y: Floats) -> Residuals:
         """Return the residuals of primal `x` (n,) and multipliers `y` (m,)."""
         if problem.matrices_changed or not self._fresh:
-            self._P.data[:] = problem.P[self._cost_map]
-            self._A.data[:] = problem.A
+            self._matrix.data[:] = np.concatenate([problem.P, problem.A])[self._sources]
             self._fresh = True
-        value: Floats = np.asarray(self._A @ x)
-        Px: Floats = np.asarray(self._P @ x)
-        primal = max(float(np.max(problem.l - value)), float(np.max(value - problem.u)), 0.0)
-        pull: Floats = np.asarray(self._A.T @ y)
-        size = 1.0 + max(float(np.max(np.abs(part))) for part in (Px, problem.q, pull))
-        dual = float(np.max(np.abs(Px + problem.q + pull))) / size
-        # The dual cost takes each multiplier at the bound its sign pushes against; at an open bound it must vanish.
-        bound = np.where(y > 0.0, problem.u, problem.l)
-        open_bound = np.isinf(bound)
-        stray = float(np.max(np.abs(y[open_bound]))) if open_bound.any() else 0.0
-        support = float(y[~open_bound] @ bound[~open_bound])
-        quadratic, linear = float(x @ Px), float(problem.q @ x)
+        product: Floats = np.asarray(self._matrix @ np.concatenate([x, y]))
+        pull, value = product[: self._n], product[self._n :]
+        primal = max(float((problem.l - value).max()), float((value - problem.u).max()), 0.0)
+        dual = float(np.abs(pull + problem.q).max()) / (1.0 + float(np.abs(problem.q).max()))
+        # x'Px from what is there: x'(Px + A'y) - y'Ax.
+        quadratic, linear = float(x @ pull) - float(y @ value), float(problem.q @ x)
+        # The dual cost takes each multiplier at the bound its sign pushes against; at an open bound that is infinite.
+        with np.errstate(invalid="ignore"):
+            pushing = np.where(y > 0.0, y * problem.u, y * problem.l)
+        support = float(pushing[np.abs(y) > _NO_PUSH].sum())
         gap = abs(quadratic + linear + support) / (1.0 + max(abs(quadratic), abs(linear), abs(support)))
-        return Residuals(primal, max(dual, stray / size), gap)
-
-
-def decode(structure: Structure, x: Floats, residuals: Residuals, iterations: int, solve_time_s: float) -> Plan:
-    """Return the plan that a decision vector `x` stands for."""
-    setting = structure.setting
-    stages = x.reshape(setting.stages, 12)
-    return Plan(
-        acceleration=stages[:, 0:4] * setting.acceleration,
-        velocity=stages[:, 4:8] * setting.velocity,
-        displacement=stages[:, 8:12] * setting.displacement,
-        residuals=residuals,
-        iterations=iterations,
-        solve_time_s=solve_time_s,
-    )
+        return Residuals(primal, dual, gap)

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bridge.messages import Floats
-from controller.machine_limits import ROWS
+from controller.machine_limits import ROWS, TIP_ROWS
 
 Indices = NDArray[np.int64]
 
@@ -31,7 +31,8 @@ Indices = NDArray[np.int64]
 # the benchmark's sequence; the rows that end up tight together are tip-over against velocity.
 JERK_SCALE = 0.25
 VELOCITY_SCALE = 3.0
-MACHINE_SCALE: Floats = np.array([0.3] * (ROWS - 4) + [0.9] * 4)  # drives, then tip-over
+DRIVE_SCALE = 0.3
+TIP_SCALE = 0.9
 
 
 class Setting(NamedTuple):
@@ -54,9 +55,10 @@ class Setting(NamedTuple):
 
     @property
     def sparse_stages(self) -> tuple[int, ...]:
-        """Stages whose end velocity, wheel speed and stroke are limited: the first three, then every third.
+        """Stages at which velocity, wheel speed, stroke and the drives are limited: the first three, then every third.
 
-        Between them nothing can leave by more than the largest acceleration gains in a stage.
+        Between them jerk and acceleration leave little room, and long before the horizon moves there the plan
+        has been made anew. Acceleration, jerk and tip-over are limited at every stage.
         """
         last = self.stages - 1
         return tuple(k for k in range(self.stages) if k < 3 or k % 3 == 1 or k == last)
@@ -89,16 +91,16 @@ class Structure:
     setting: Setting
     cost: Pattern  # upper triangle of the Hessian
     constraints: Pattern
-    rows: dict[str, Indices]  # kind -> rows of the constraint matrix, (stages of that kind, width)
+    rows: dict[str, Indices]  # kind -> its rows of the constraint matrix, in one piece, (stages, width)
     cost_values: Any  # casadi.Function -> Hessian's upper non-zeros
     gradient: Any  # casadi.Function -> gradient at zero
     constraint_values: Any  # casadi.Function -> non-zeros
     constraint_offset: Any  # casadi.Function -> constraints at zero
 
-    @property
-    def variables(self) -> int:
-        """Number of decision variables."""
-        return self.cost.shape[0]
+    def view(self, values: Floats, kind: str) -> Floats:
+        """Return the entries of a row vector (m,) that belong to a kind, as (its stages, its width)."""
+        rows = self.rows[kind]
+        return values[rows[0, 0] : rows[-1, -1] + 1].reshape(rows.shape)
 
 
 def acceleration_index(stage: int, axis: int) -> int:
@@ -152,7 +154,8 @@ def build(setting: Setting) -> Structure:
             stage["velocity"] = VELOCITY_SCALE * v_next / v_max
             stage["wheel_speed"] = ca.DM(setting.wheel_speed) @ v_next[:3]
             stage["stroke"] = p_next[3] / p_max[3]
-        stage["machine"] = ca.DM(MACHINE_SCALE) * (machine @ a)
+            stage["drive"] = DRIVE_SCALE * (machine[: TIP_ROWS.start, :] @ a)
+        stage["tip_over"] = TIP_SCALE * (machine[TIP_ROWS.start :, :] @ a)
         for kind, rows in stage.items():
             blocks.setdefault(kind, []).append(rows)
         p, v, before = p_next, v_next, a

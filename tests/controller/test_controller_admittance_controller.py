@@ -237,8 +237,8 @@ def test_tip_over_margin_is_respected_whenever_it_can_be(seed: int) -> None:
         command = loop.step(wrench, random.random() if random.random() < 0.1 else 0.0)
         terms = walker.evaluate(height, before)
         machine.linearise(terms)
-        bounds = machine.bounds(terms, wrench[None])
-        way = LIMITS.clamp(machine.give_way(terms, wrench[None], bounds), before, last, height, PERIOD_S)
+        bounds = machine.bounds(terms, wrench, np.ones(1))
+        way = LIMITS.clamp(machine.give_way(terms, wrench, bounds), before, last, height, PERIOD_S)
         tip = machine.rows[8:] @ command.acceleration - bounds.high[0, 8:]
         best = machine.rows[8:] @ way - bounds.high[0, 8:]
         assert tip.max() <= max(best.max(), 0.0) + 0.04

@@ -69,10 +69,10 @@ def test_controlled_stop_comes_to_rest_at_the_limits_and_stays(velocity: list[fl
 @settings(deadline=None, max_examples=30)
 def test_clamped_law_stays_within_the_machine_or_as_near_as_giving_way(seed: int) -> None:
     random = np.random.default_rng(seed)
-    wrench = random.normal(0, [150, 150, 600, 20, 20, 20])[None]
+    wrench = random.normal(0, [150, 150, 600, 20, 20, 20])
     terms = WALKER.evaluate(float(random.uniform(0.7, 1.2)), random.normal(0, 0.3, 4))
     MACHINE.linearise(terms)
-    bounds = MACHINE.bounds(terms, wrench)
+    bounds = MACHINE.bounds(terms, wrench, np.ones(1))
     way = MACHINE.give_way(terms, wrench, bounds)
     got = within_machine(random.normal(0, 4, 4), way, MACHINE.rows, bounds)
     at_way, at_got = MACHINE.rows @ way, MACHINE.rows @ got
@@ -85,7 +85,6 @@ def test_clamped_law_stays_within_the_machine_or_as_near_as_giving_way(seed: int
 def test_clamped_law_follows_the_wish_where_the_machine_can() -> None:
     terms = WALKER.evaluate(1.0, np.zeros(4))
     MACHINE.linearise(terms)
-    calm = np.zeros((1, 6))
-    bounds = MACHINE.bounds(terms, calm)
+    bounds = MACHINE.bounds(terms, np.zeros(6), np.ones(1))
     wish = np.array([1.0, -0.5, 0.7, 0.5])
     np.testing.assert_allclose(within_machine(wish, np.zeros(4), MACHINE.rows, bounds), wish)

@@ -52,14 +52,14 @@ class Bench:
         stages = np.broadcast_to(np.asarray(profile, dtype=float), (self.config.stages,)).copy()
         terms = self.walker.evaluate(height_m, velocity)
         self.machine.linearise(terms)
-        wrenches = self.fading[:, None] * np.asarray(wrench, dtype=float)
-        bounds = self.machine.bounds(terms, wrenches)
-        force = wrenches @ terms.interface
+        push = np.asarray(wrench, dtype=float)
+        bounds = self.machine.bounds(terms, push, self.fading)
+        force = self.fading[:, None] * (push @ terms.interface)
         self.admittance.reset()
         pose = np.array([0.0, 0.0, 0.0, height_m])
         self.admittance.stages(stages, pose, velocity, force[0])
         law = self.admittance.stages(stages, pose + np.asarray(apart), velocity, force[0])
-        give_way = self.machine.give_way(terms, wrenches, bounds)
+        give_way = self.machine.give_way(terms, push, bounds)
         return Instant(law, force, velocity, previous, height_m, bounds, give_way)
 
     def plan(self, instant: Instant) -> Plan:

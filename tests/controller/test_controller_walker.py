@@ -12,6 +12,7 @@ from controller.machine_limits import ROWS, MachineLimits, ground_moments
 from controller.walker import WHEELS, Walker, urdf
 
 CONFIG = WalkerConfig(chassis_com_forward_m=0.07)
+NOW = np.ones(1)
 
 
 @pytest.fixture(scope="module")
@@ -150,13 +151,13 @@ def test_limits_are_satisfied_at_rest_and_mirror_symmetric() -> None:
     terms = walker.evaluate(1.0, np.zeros(4))
     assert machine.rows.shape == (ROWS, 4)
     mirror = np.array([1.0, -1.0, -1.0, 1.0])
-    wrench = np.array([[50.0, 80.0, -400.0, 6.0, -3.0, 9.0]])
+    wrench = np.array([50.0, 80.0, -400.0, 6.0, -3.0, 9.0])
     mirrored = wrench * [1, -1, 1, -1, 1, -1]
-    rest = machine.bounds(terms, np.zeros((1, 6)))
+    rest = machine.bounds(terms, np.zeros(6), NOW)
     assert (rest.low < 0).all()
     assert (rest.high > 0).all()
     wheels = [1, 0, 3, 2]
-    one, other = machine.bounds(terms, wrench), machine.bounds(terms, mirrored)
+    one, other = machine.bounds(terms, wrench, NOW), machine.bounds(terms, mirrored, NOW)
     np.testing.assert_allclose(one.high[0, :4], other.high[0, wheels], atol=1e-9)
     np.testing.assert_allclose(one.high[0, 8:10], other.high[0, 8:10], atol=1e-9)
     np.testing.assert_allclose(one.high[0, [10, 11]], other.high[0, [11, 10]], atol=1e-9)
@@ -167,10 +168,10 @@ def test_giving_way_keeps_drives_and_balance_where_that_is_possible() -> None:
     walker = Walker(WalkerConfig())
     machine = MachineLimits(walker)
     terms = walker.evaluate(1.0, np.zeros(4))
-    calm = machine.bounds(terms, np.zeros((1, 6)))
-    np.testing.assert_allclose(machine.give_way(terms, np.zeros((1, 6)), calm), 0.0)
-    push = np.array([[0.0, 300.0, -100.0, 0, 0, 0]])
-    bounds = machine.bounds(terms, push)
+    calm = machine.bounds(terms, np.zeros(6), NOW)
+    np.testing.assert_allclose(machine.give_way(terms, np.zeros(6), calm), 0.0)
+    push = np.array([0.0, 300.0, -100.0, 0, 0, 0])
+    bounds = machine.bounds(terms, push, NOW)
     assert not (bounds.high[0] >= 0).all()  # standing still would tip the walker
     way = machine.give_way(terms, push, bounds)
     assert way[1] > 0  # so it moves under the push
@@ -183,9 +184,8 @@ def test_an_overwhelming_push_is_given_way_to_in_its_direction() -> None:
     walker = Walker(WalkerConfig(acceleration_forward_max_m_s2=15.0, wheel_torque_max_nm=5.0))
     machine = MachineLimits(walker)
     terms = walker.evaluate(1.0, np.zeros(4))
-    push = np.array([[-600.0, 0, 0, 0, -500.0, 0]])  # low enough not to tip
-    push[0, 4] = 560.0
-    bounds = machine.bounds(terms, push)
+    push = np.array([-600.0, 0, 0, 0, 560.0, 0])  # its torque keeps it from tipping
+    bounds = machine.bounds(terms, push, NOW)
     way = machine.give_way(terms, push, bounds)
     assert way[0] < 0
     value = machine.rows[:4] @ way
