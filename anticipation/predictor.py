@@ -14,6 +14,7 @@ from anticipation.fast_gait_state import FastDirectedGraph
 from anticipation.fast_motion import fast_forecast
 from anticipation.motion import BASELINES, COORDINATES, HORIZON, WINDOW
 from anticipation.quality import Quality, judge
+from anticipation.transient import fold
 from anticipation.window import PoseWindow
 from bridge.config.anticipation import AnticipationConfig
 from bridge.messages import CLASSES, KEYPOINTS, STEP_S, STEPS, FallHorizon, Floats, Keypoints
@@ -107,7 +108,9 @@ class Predictor:
             if self._plane.features == "embedding":
                 features = judgement.embedding
             else:  # every window is a stretch of the flattened frames
-                features = self._frames.flatten().unfold(0, WINDOW * COORDINATES, COORDINATES)
+                plain = self._plane.features == "window"
+                poses = self._frames if plain else torch.from_numpy(fold(self._frames.numpy()))
+                features = poses.flatten().unfold(0, WINDOW * COORDINATES, COORDINATES)
             frames, logits = self._frames[0], judgement.logits
             return frames.double().numpy(), logits.double().numpy(), features.double().numpy()
 

@@ -17,9 +17,20 @@ from numpy.typing import NDArray
 
 from bridge.messages import CLASSES, STEP_S, Floats
 
-Features: TypeAlias = Literal["window", "embedding"]
+Features: TypeAlias = Literal["window", "folded", "embedding"]
 FALL: Final = CLASSES.index("fall")
 REACH: Final = 100.0  # distances beyond +-100 sd say nothing more and are cut there [sd]
+
+
+def fold(poses: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Return relative poses (..., 12, 2) folded along the body's vertical: |x|, y.
+
+    A fall to the left and the same fall to the right become one. A linear map of the plain coordinates
+    cannot do that: what it learns of falls to one side, it expects of falls to that side only.
+    """
+    folded = np.array(poses)
+    np.abs(folded[..., 0], out=folded[..., 0])
+    return folded
 
 
 class Transition(NamedTuple):
@@ -37,15 +48,15 @@ class _Wedge(NamedTuple):
 
     normals: Floats  # (2, 2) unit normals, pointing out
     offsets: Floats  # (2,) inside is normal @ point <= offset
-    corner: Floats  # (2,) where the lines meet
+    corner: Floats  # (2,) where the lines meet; inf where they are parallel
 
 
 @dataclass(frozen=True)
 class TransientPlane:
     """An affine map to the plane, three class centres and three linear scores.
 
-    `features` says what it was fitted on: `window` (the 15 x 24 relative coordinates of a window, flattened)
-    or `embedding` (the classifier's 128 pooled features).
+    `features` says what it was fitted on: `window` (the 15 x 24 relative coordinates of a window, flattened),
+    `folded` (the same after `fold`), or `embedding` (the classifier's 128 pooled features).
     """
 
     features: Features
@@ -69,9 +80,10 @@ class TransientPlane:
             array.flags.writeable = False
             object.__setattr__(self, name, array)
         normals, offsets = self._fall_normals()
-        if abs(np.linalg.det(normals)) < 1e-9:
-            raise ValueError("plane has parallel class boundaries: the three classes do not spread over it")
-        corner = np.linalg.solve(normals, offsets).astype(np.float64)
+        if (np.abs(normals).max(axis=1) < 1e-9).any():
+            raise ValueError("plane has no boundary around the fall region: the classes do not spread over it")
+        parallel = abs(np.linalg.det(normals)) < 1e-9
+        corner = np.full(2, np.inf) if parallel else np.linalg.solve(normals, offsets).astype(np.float64)
         object.__setattr__(self, "_wedge", _Wedge(normals, offsets, corner))
 
     @classmethod

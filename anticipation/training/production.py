@@ -21,9 +21,10 @@ from anticipation.training.measures import temperatures
 from anticipation.training.networks import fitted_classifier, pretrained_forecaster, tuned_forecaster
 from anticipation.training.plan import Plan
 from anticipation.training.samples import cut
-from anticipation.transient import TransientPlane
+from anticipation.transient import TransientPlane, fold
 from bridge.errors import SourceError
 from bridge.messages import STEPS, Floats
+from perception.skeleton import MIRROR
 
 LICENCE: Final = (
     "research, non-commercial: learnt from URFD (CC BY-NC-SA 4.0), UP-Fall (research use), "
@@ -90,8 +91,9 @@ def _fit(
 def _plane(corpus: Corpus, seed: int) -> TransientPlane:
     """Fit the plane to windows of the URFD falls, with some of daily life and of walks to keep the boundary off them.
 
-    Its features are the windows themselves: over the last second before lying the distance to the fall region then
-    falls steadily (docs/anticipation.md), which it does not on the classifier's pooled features.
+    Its features are the windows themselves, folded and with their mirror images, so that left and right count alike:
+    over the last second before lying the distance to the fall region then falls steadily (docs/anticipation.md),
+    which it does not on the classifier's pooled features.
     """
     rng = np.random.default_rng(seed)
     features, labels = [], []
@@ -100,9 +102,11 @@ def _plane(corpus: Corpus, seed: int) -> TransientPlane:
         rows = np.flatnonzero(samples.labels[:, 0] >= 0)
         if most is not None and most < len(rows):
             rows = np.sort(rng.choice(rows, most, replace=False))
-        features.append(samples.poses[rows, :WINDOW].reshape(len(rows), -1))
-        labels.append(samples.labels[rows, 0])
-    return TransientPlane.fit(np.concatenate(features), np.concatenate(labels), "window")
+        folded = fold(samples.poses[rows, :WINDOW])
+        for side in (folded, folded[..., MIRROR, :]):
+            features.append(side.reshape(len(rows), -1))
+            labels.append(samples.labels[rows, 0])
+    return TransientPlane.fit(np.concatenate(features), np.concatenate(labels), "folded")
 
 
 def _statistics(known: Shares, seed: int) -> PoseStatistics:

@@ -34,7 +34,7 @@ def random_plane(features: str) -> TransientPlane:
     """A plane fitted on three clouds along a bent line."""
     random = np.random.default_rng(0)
     labels = np.arange(300) % 3
-    seen = random.normal(size=(300, 360 if features == "window" else 128))
+    seen = random.normal(size=(300, 128 if features == "embedding" else 360))
     seen[:, 0] += 40 * labels
     seen[:, 1] += 40 * (labels == 1)
     return TransientPlane.fit(seen, labels, features)

@@ -7,12 +7,14 @@ import pytest
 import torch
 from anticipation_nets import STANDING, lost, message, nobody, random_checkpoint
 
-from anticipation.checkpoint import save
+from anticipation.checkpoint import load, save
 from anticipation.motion import LstmForecaster, constant_velocity, zero_velocity
 from anticipation.predictor import Predictor
+from anticipation.transient import fold
 from bridge.config.anticipation import AnticipationConfig
 from bridge.errors import CheckpointError
 from bridge.messages import CLASSES, STEP_S, FallHorizon
+from perception.skeleton import MIRROR
 
 CONFIG = AnticipationConfig(min_quality=0.0)
 STABLE = CLASSES.index("stable")
@@ -51,7 +53,7 @@ def test_a_horizon_from_the_fifteenth_tick_on():
             assert horizon.stamp_ns == message(tick).stamp_ns
 
 
-@pytest.mark.parametrize("features", ["window", "embedding"])
+@pytest.mark.parametrize("features", ["window", "folded", "embedding"])
 @pytest.mark.parametrize("forecaster", [None, LstmForecaster("direct", 16).eval(), "constant_velocity"])
 def test_the_sixteen_steps_are_sixteen_windows_judged_one_by_one(features, forecaster):
     checkpoint = random_checkpoint(features=features)
@@ -63,7 +65,11 @@ def test_the_sixteen_steps_are_sixteen_windows_judged_one_by_one(features, forec
         frames = torch.cat((seen, checkpoint.forecast(seen)), dim=1)
         windows = torch.cat([frames[:, step : step + 15] for step in range(16)])
         logits = checkpoint.classifier(windows)[:, 0].double().numpy() / checkpoint.temperature[:, None]
-        inputs = windows.flatten(1) if features == "window" else checkpoint.classifier.embedding(windows)[:, 0]
+        inputs = {
+            "window": windows.flatten(1),
+            "folded": torch.stack((windows[..., 0].abs(), windows[..., 1]), dim=-1).flatten(1),
+            "embedding": checkpoint.classifier.embedding(windows)[:, 0],
+        }[features]
     expected = np.exp(logits) / np.exp(logits).sum(axis=1, keepdims=True)
     np.testing.assert_allclose(horizon.probabilities, expected, atol=1e-5)
     transition = checkpoint.plane.transition(inputs.double().numpy())
@@ -72,6 +78,16 @@ def test_the_sixteen_steps_are_sixteen_windows_judged_one_by_one(features, forec
     np.testing.assert_allclose(horizon.centre_distance, transition.centre_distance, atol=1e-4)
     rate = np.gradient(horizon.distance, STEP_S)
     np.testing.assert_allclose(horizon.distance_rate, rate, atol=1e-9)
+
+
+def test_the_shipped_plane_sees_left_and_right_alike():
+    plane = load(None).plane
+    random = np.random.default_rng(0)
+    windows = random.normal(0, 0.5, (50, 15, 12, 2))
+    mirrored = windows[:, :, MIRROR] * np.array([-1.0, 1.0])
+    distance, other = (plane.signed_distance(plane.project(fold(side).reshape(50, -1))) for side in (windows, mirrored))
+    np.testing.assert_allclose(distance, other, atol=1e-6)
+    assert np.ptp(distance) > 0.5
 
 
 @pytest.mark.parametrize("name", ["zero_velocity", "constant_velocity"])

@@ -148,9 +148,23 @@ def test_two_classes_are_not_enough():
         ({"features": "spectrum"}, "plane features"),
         ({"projection": np.zeros((4, 3))}, "plane projection has shape"),
         ({"biases": np.array([0.0, np.nan, 0.0])}, "plane biases is not finite"),
-        ({"weights": np.ones((3, 2))}, "parallel"),
+        ({"weights": np.ones((3, 2))}, "no boundary"),
     ],
 )
 def test_arrays_that_make_no_plane_are_refused(change, says):
     with pytest.raises(ValueError, match=says):
         TransientPlane(**({"features": "window", **WEDGE.arrays()} | change))
+
+
+def test_classes_in_a_line_have_parallel_boundaries_and_the_nearer_one_counts():
+    plane = TransientPlane(
+        features="window",
+        projection=np.eye(2),
+        offset=np.zeros(2),
+        centres=np.array([[-3.0, 0.0], [0.0, 0.0], [3.0, 0.0]]),
+        weights=np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]]),
+        biases=np.array([0.0, 1.0, 0.0]),
+    )
+    points = np.array([[-2.0, 5.0], [0.0, -7.0], [1.0, 0.0], [2.5, 40.0]])
+    np.testing.assert_allclose(plane.signed_distance(points), [3.0, 1.0, 0.0, -1.5], atol=1e-12)
+    assert plane.regions(points).tolist() == [0, 1, 1, 2]
