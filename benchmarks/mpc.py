@@ -38,7 +38,7 @@ REFERENCE_EVERY = 10
 class Scene:
     """A walking person: sway of 1.8 steps a second, a push, a fall into the harness foreseen by 300 ms."""
 
-    SIDE = (80.0, -120.0, 200.0, -300.0)  # pushes of successive cycles [N]
+    SIDE = (80.0, -120.0, 200.0, -300.0)  # peak of successive cycles' sideward push; the last would tip the walker [N]
     FORE = (150.0, -100.0, 0.0, 250.0)  # forward pull while hanging [N]
 
     def __init__(self, stages: int, stage_s: float) -> None:
@@ -53,10 +53,12 @@ class Scene:
         wrench = np.array([25 + 15 * sway, 10 * half, -30 - 20 * sway, 0.0, 0.0, 3 * half])
         wrench += self._random.normal(0, [1.5, 1.5, 1.5, 0.2, 0.2, 0.4])
         if 1.0 < phase < 1.25:
-            wrench[1] += self.SIDE[cycle]
+            wrench[1] += self.SIDE[cycle] * np.sin(np.pi * (phase - 1.0) / 0.25)
         if 1.6 < phase < 2.4:
-            wrench[2] -= 900.0 * min(1.0, (phase - 1.6) / 0.2)
-            wrench[0] += self.FORE[cycle]
+            # Falls into the harness within 100 ms, stands up again within 200.
+            hanging = min(1.0, (phase - 1.6) / 0.1, (2.4 - phase) / 0.2)
+            wrench[2] -= 900.0 * hanging
+            wrench[0] += self.FORE[cycle] * hanging
         return wrench
 
     def profile(self, t: float) -> np.ndarray:
@@ -122,7 +124,8 @@ def measure(seconds: float, with_reference: bool) -> dict[str, Any]:
                 planned = controller.last_plan.acceleration[0] / scale
                 errors.append(float(np.abs(planned - reference(controller)).max()))
         else:
-            reasons[command.reason] = reasons.get(command.reason, 0) + 1
+            reason = command.reason.split(",")[0]
+            reasons[reason] = reasons.get(reason, 0) + 1
         velocity = velocity + (command.velocity - velocity) * (1.0 - np.exp(-PERIOD_S / 0.05))
         heading = pose[2]
         turn = np.array([[np.cos(heading), -np.sin(heading)], [np.sin(heading), np.cos(heading)]])

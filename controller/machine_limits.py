@@ -75,7 +75,7 @@ class MachineLimits:
         self.rows[WHEEL_ROWS, :3] = self._wheel_map @ terms.mass[:3, :3]
         floor = terms.mass - self._walker.reflected
         self.rows[TRACTION_ROWS] = self._traction_map @ floor[:2]
-        self.rows[TIP_ROWS] = self._edges @ ground_moments(terms, self._weight).by_acceleration
+        self.rows[TIP_ROWS] = self._edges @ moments_by_acceleration(terms)
 
     def bounds(self, terms: WalkerTerms, wrench: Floats, fading: Floats) -> MachineBounds:
         """Return the limits at instants at which `fading` (stages,) of `wrench` is left.
@@ -92,7 +92,7 @@ class MachineLimits:
         carried = alone - left * by_person
         # The column's own acceleration may take this much load off the floor; less than none grips nothing.
         grip = np.maximum((self._weight - self._shifting - left * wrench[2]) / self._weight, 0.0)
-        _, bias, by_wrench = ground_moments(terms, self._weight)
+        resting, pushed = moments_at_rest(terms, self._weight, wrench)
         stages = len(fading)
         low, high = np.empty((stages, ROWS)), np.empty((stages, ROWS))
         low[:, WHEEL_ROWS] = -1.0
@@ -101,7 +101,7 @@ class MachineLimits:
         low[:, DRIVE_ROWS] -= carried
         high[:, DRIVE_ROWS] -= carried
         low[:, TIP_ROWS] = -np.inf
-        high[:, TIP_ROWS] = -(self._edges @ bias) - left * (self._edges @ (by_wrench @ wrench))
+        high[:, TIP_ROWS] = -(self._edges @ resting) - left * (self._edges @ pushed)
         inertia, most = terms.mass[3, 3], self._acceleration[3]
         load = terms.bias[3] - fading * push[3]
         box_low, box_high = np.empty((stages, 4)), np.empty((stages, 4))
@@ -136,35 +136,26 @@ class MachineLimits:
         return np.clip(value, -self._acceleration, self._acceleration)
 
 
-class GroundMoments(NamedTuple):
-    """Moments about the base frame's origin and load on the floor: `(N x_zmp, N y_zmp, N) = G a + b + H w`."""
-
-    by_acceleration: Floats  # G (3, 4)
-    bias: Floats  # b (3,) [N m, N m, N]
-    by_wrench: Floats  # H (3, 6)
-
-
-def ground_moments(terms: WalkerTerms, weight_n: float) -> GroundMoments:
-    """Return the balance of momentum, solved for what the floor must give.
+def moments_by_acceleration(terms: WalkerTerms) -> Floats:
+    """Return G (3, 4): what accelerations add to the moments (N x_zmp, N y_zmp) and the load N on the floor.
 
     With c the centre of mass, R = (R_x, R_y, N) the floor's reaction and L the angular momentum about c:
     `N x = c_x N - c_z R_x - L_y' + ((p - c) x f)_y + t_y`, and alike for y; R = P' + weight - f.
     """
-    momentum, rate, centre, point = terms.momentum, terms.momentum_bias, terms.centre_of_mass, terms.interface_position
+    momentum, (x, y, z) = terms.momentum, terms.centre_of_mass
     G = np.empty((3, 4))
-    G[0] = centre[0] * momentum[2] - centre[2] * momentum[0] - momentum[4]
-    G[1] = centre[1] * momentum[2] - centre[2] * momentum[1] + momentum[3]
+    G[0] = x * momentum[2] - z * momentum[0] - momentum[4]
+    G[1] = y * momentum[2] - z * momentum[1] + momentum[3]
     G[2] = momentum[2]
+    return G
+
+
+def moments_at_rest(terms: WalkerTerms, weight_n: float, wrench: Floats) -> tuple[Floats, Floats]:
+    """Return the same (3,) without acceleration: by the walker's weight and turning, and by a person's wrench (6,)."""
+    x, y, z = terms.centre_of_mass.tolist()
+    rate = terms.momentum_bias.tolist()
+    px, py, pz = terms.interface_position.tolist()
+    fx, fy, fz, tx, ty, _ = wrench.tolist()
     load = weight_n + rate[2]
-    bias = np.array(
-        [
-            centre[0] * load - centre[2] * rate[0] - rate[4],
-            centre[1] * load - centre[2] * rate[1] + rate[3],
-            load,
-        ]
-    )
-    H = np.zeros((3, 6))
-    H[0, 0], H[0, 2], H[0, 4] = point[2], -point[0], 1.0
-    H[1, 1], H[1, 2], H[1, 3] = point[2], -point[1], -1.0
-    H[2, 2] = -1.0
-    return GroundMoments(G, bias, H)
+    alone = np.array([x * load - z * rate[0] - rate[4], y * load - z * rate[1] + rate[3], load])
+    return alone, np.array([pz * fx - px * fz + ty, pz * fy - py * fz - tx, -fz])

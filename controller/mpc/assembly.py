@@ -13,6 +13,7 @@ measurement can break velocity or stroke.
 from __future__ import annotations
 
 import numpy as np
+from scipy import sparse
 
 from bridge.messages import Floats
 from controller.admittance import AdmittanceStages
@@ -51,18 +52,40 @@ class Assembly:
         self._q: Floats = np.array(structure.gradient(*parameters)).ravel()
         self._l: Floats = np.zeros(structure.constraints.shape[0])
         self._u: Floats = np.zeros(structure.constraints.shape[0])
-        # Lower and upper limits of each kind of row, as views of l and u.
-        self._limits = {kind: (structure.view(self._l, kind), structure.view(self._u, kind)) for kind in structure.rows}
-        self._limits["jerk"][0][:], self._limits["jerk"][1][:] = -JERK_SCALE, JERK_SCALE
-        self._limits["tip_over"][0][:] = -np.inf
+        # Limits before they are opened, with views of each kind of row; what never changes is written here.
+        self._low, self._high = np.zeros(len(self._l)), np.zeros(len(self._l))
+        self._limits = {
+            kind: (structure.view(self._low, kind), structure.view(self._high, kind)) for kind in structure.rows
+        }
+        most = 1.0 - _RESERVE
+        for kind, limit in (
+            ("acceleration", 1.0),
+            ("jerk", JERK_SCALE),
+            ("velocity", VELOCITY_SCALE * most),
+            ("wheel_speed", most),
+            ("tip_over", np.inf),
+        ):
+            self._limits[kind][0][:], self._limits[kind][1][:] = -limit, limit
+        # The dynamics come first and are equations; jerk is never opened.
+        self._first_limit = 8 * N
+        self._opening: Floats = np.full(len(self._l), _OPENING)
+        self._opening[structure.rows["jerk"]] = 0.0
+        pattern = structure.constraints
+        numbered = sparse.csc_matrix((np.arange(1.0, len(self._A) + 1), pattern.indices, pattern.indptr), pattern.shape)
+        self._matrix = sparse.csr_matrix(numbered)
+        self._matrix_sources = self._matrix.data.astype(np.int64) - 1
+        self._matrix.data[:] = self._A[self._matrix_sources]
+        self._motion: Floats = np.zeros((N, 12))
         self._map_cost(structure)
         self._map_constraints(structure)
-        # Instants at which a stage's acceleration may have changed: one period, then whole stages.
-        self._since_previous: Floats = (setting.period_s + setting.stage_s * np.arange(N, dtype=np.float64))[:, None]
+        # How far acceleration can have moved by each stage: one period, then whole stages.
+        self._count = np.arange(N)
+        self._reach: Floats = (
+            setting.jerk * (setting.period_s + setting.stage_s * np.arange(N, dtype=np.float64))[:, None]
+        )
         self._weights: Floats = 1.0 / (setting.mass * setting.acceleration)
-        self._per_velocity: Floats = VELOCITY_SCALE / setting.velocity
-        self._per_acceleration: Floats = 1.0 / setting.acceleration
-        self._wheel_map: Floats = np.ascontiguousarray(setting.wheel_speed.T)
+        self._per_first_jerk: Floats = JERK_SCALE / (setting.jerk * setting.period_s)
+        self._displacement = setting.displacement
         self._law: tuple[bytes, bytes] | None = None
         self._tip: Floats = machine_rows[TIP_ROWS].copy()
 
@@ -91,7 +114,7 @@ class Assembly:
         """
         changed = self._fill_matrices(law, machine_rows)
         self._fill_gradient(law, force - law.load, velocity, previous)
-        self._fill_bounds(velocity, previous, height_m, machine_rows, bounds, give_way)
+        self._fill_bounds(velocity, previous, height_m, bounds, give_way)
         return Problem(self._P, self._q, self._A, self._l, self._u, changed)
 
     def _map_cost(self, structure: Structure) -> None:
@@ -152,6 +175,7 @@ class Assembly:
         if not np.array_equal(machine_rows[TIP_ROWS], self._tip):
             self._tip[:] = machine_rows[TIP_ROWS]
             self._A[self._tip_positions] = TIP_SCALE * self._tip * self._setting.acceleration
+            self._matrix.data[:] = self._A[self._matrix_sources]
             changed = True
         return changed
 
@@ -168,74 +192,59 @@ class Assembly:
         np.multiply(self._by_p[1:], given[1:], out=stages[:-1, 8:12])
 
     def _give_way_motion(self, give_way: Floats, velocity: Floats, previous: Floats) -> Floats:
-        """Return the accelerations (N, 4) that ramp to `give_way` and back to zero before velocity leaves its limit."""
+        """Return, as a decision, the motion that ramps to `give_way`, and back before velocity leaves its limit."""
         setting = self._setting
-        reach = setting.jerk * self._since_previous
-        ramp: Floats = previous + np.clip(give_way - previous, -reach, reach)
-        count = np.arange(setting.stages)
+        dt = setting.stage_s
+        ramp: Floats = previous + np.minimum(np.maximum(give_way - previous, -self._reach), self._reach)
+        count = self._count
         for axis in np.flatnonzero(give_way):
             sign = np.sign(give_way[axis])
             # One row for each stage at which to begin fading; the last that ends inside the limit is taken.
-            fade = setting.jerk[axis] * setting.stage_s * np.maximum(count - count[:, None], 0)
+            fade = setting.jerk[axis] * dt * np.maximum(count - count[:, None], 0)
             reached = sign * ramp[np.minimum(count, count[:, None]), axis]
             options = np.sign(reached) * np.maximum(np.abs(reached) - fade, 0.0)
-            end = sign * velocity[axis] + setting.stage_s * options.sum(axis=1)
+            end = sign * velocity[axis] + dt * options.sum(axis=1)
             best = max(int(np.sum(end <= (1.0 - _RESERVE) * setting.velocity[axis])) - 1, 0)
             ramp[:, axis] = sign * options[best]
-        return ramp
+        speed = velocity + dt * ramp.cumsum(axis=0)
+        way = dt * (speed.cumsum(axis=0) + 0.5 * (velocity - speed))
+        motion = self._motion
+        np.divide(ramp, setting.acceleration, out=motion[:, 0:4])
+        np.divide(speed, setting.velocity, out=motion[:, 4:8])
+        np.divide(way, self._displacement, out=motion[:, 8:12])
+        return motion.ravel()
 
     def _fill_bounds(
         self,
         velocity: Floats,
         previous: Floats,
         height_m: float,
-        machine_rows: Floats,
         bounds: MachineBounds,
         give_way: Floats,
     ) -> None:
         setting, limits = self._setting, self._limits
-        dt, per_acceleration = setting.stage_s, self._per_acceleration
-        # The give-way motion, at every stage.
-        ramp = self._give_way_motion(give_way, velocity, previous)
-        speed = ramp.cumsum(axis=0)
-        speed *= dt
-        speed += velocity
         for side in limits["velocity_dynamics"]:
             np.multiply(velocity, 4.0 / setting.velocity, out=side[0])
         for side in limits["displacement_dynamics"]:
             np.divide(velocity, setting.velocity, out=side[0])
-        shift = JERK_SCALE * previous / (setting.jerk * setting.period_s)
+        low, high = limits["acceleration"]
+        low[:, 3] = bounds.box_low[:, 3] / setting.acceleration[3]
+        high[:, 3] = bounds.box_high[:, 3] / setting.acceleration[3]
         low, high = limits["jerk"]
+        shift = previous * self._per_first_jerk
         low[0], high[0] = shift - JERK_SCALE, shift + JERK_SCALE
-        _open(
-            limits["acceleration"],
-            bounds.box_low * per_acceleration,
-            bounds.box_high * per_acceleration,
-            ramp * per_acceleration,
-        )
-        most = 1.0 - _RESERVE
-        held = speed[self._sparse]
-        _open(limits["velocity"], -VELOCITY_SCALE * most, VELOCITY_SCALE * most, held * self._per_velocity)
-        _open(limits["wheel_speed"], -most, most, held[:, :3] @ self._wheel_map)
-        # Height at the stages' ends by the trapezoidal rule.
-        column = speed[:, 3]
-        way = ((column.cumsum() - 0.5 * column + 0.5 * velocity[3]) * (dt / setting.displacement[3]))[self._sparse]
-        low_m, high_m = self._stroke_m
+        low, high = limits["stroke"]
         scale = setting.displacement[3]
-        _open(limits["stroke"], (low_m - height_m) / scale, (high_m - height_m) / scale, way[:, None])
-        carried = ramp @ machine_rows.T
-        sparse = self._sparse
-        _open(
-            limits["drive"],
-            bounds.low[sparse, DRIVE_ROWS] * DRIVE_SCALE,
-            bounds.high[sparse, DRIVE_ROWS] * DRIVE_SCALE,
-            carried[sparse, DRIVE_ROWS] * DRIVE_SCALE,
-        )
-        np.maximum(bounds.high[:, TIP_ROWS], carried[:, TIP_ROWS] + _OPENING, out=limits["tip_over"][1])
-        limits["tip_over"][1][:] *= TIP_SCALE
+        low[:], high[:] = (self._stroke_m[0] - height_m) / scale, (self._stroke_m[1] - height_m) / scale
+        low, high = limits["drive"]
+        np.multiply(bounds.low[self._sparse, DRIVE_ROWS], DRIVE_SCALE, out=low)
+        np.multiply(bounds.high[self._sparse, DRIVE_ROWS], DRIVE_SCALE, out=high)
+        np.multiply(bounds.high[:, TIP_ROWS], TIP_SCALE, out=limits["tip_over"][1])
 
-
-def _open(limits: tuple[Floats, Floats], low: Floats | float, high: Floats | float, motion: Floats) -> None:
-    """Write limits, opened to what a motion needs."""
-    np.minimum(low, motion - _OPENING, out=limits[0])
-    np.maximum(high, motion + _OPENING, out=limits[1])
+        # What the give-way motion makes of every row opens the limits that it would break.
+        needed: Floats = np.asarray(self._matrix @ self._give_way_motion(give_way, velocity, previous))
+        first = self._first_limit
+        np.minimum(self._low, needed - self._opening, out=self._l)
+        np.maximum(self._high, needed + self._opening, out=self._u)
+        self._l[:first] = self._low[:first]
+        self._u[:first] = self._high[:first]

@@ -102,6 +102,28 @@ def test_the_column_holds_its_height_and_carries_a_person_who_falls_into_the_har
     assert abs(loop.velocity[3]) < 1e-2
 
 
+@pytest.mark.parametrize("rise_per_s", [8.0, 20.0])
+def test_a_person_descending_at_0_9_m_s_is_caught_within_10_cm(rise_per_s: float) -> None:
+    """100 kg in a harness of 40 kN/m that goes taut as stiffening begins: pelvis drop, column and strap together."""
+    loop = Loop(lag_s=0.03)
+    loop.run(0.2, np.zeros(6))
+    mass, stiffness, damping, dt = 100.0, 40e3, 800.0, 5e-4
+    start = pelvis = loop.pose[3]
+    speed, lowest, load = -0.9, 0.0, 0.0
+    for k in range(100):
+        before = loop.pose[3]
+        loop.step([0, 0, -load, 0, 0, 0], min(1.0, rise_per_s * k * PERIOD_S), GaitState.ARREST)
+        for fine in range(1, 21):
+            bar = before + (loop.pose[3] - before) * fine / 20
+            taut = bar - pelvis
+            load = max(0.0, stiffness * taut + damping * (loop.velocity[3] - speed)) if taut > 0 else 0.0
+            speed += dt * (load / mass - WALKER.gravity_m_s2)
+            pelvis += dt * speed
+        lowest = min(lowest, pelvis - start)
+    assert lowest > -0.10
+    assert load == pytest.approx(mass * WALKER.gravity_m_s2, rel=0.02)
+
+
 def test_free_walking_follows_a_leaning_person_gently() -> None:
     loop = Loop()
     loop.run(3.0, [0, 0, -30.0, 0, 0, 0])
