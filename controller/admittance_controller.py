@@ -164,7 +164,7 @@ class AdmittanceController:
             self._started = True
             self._last_solved_ns = now_ns
         else:
-            self._motion.follow(odometry, span_s)
+            self._motion.follow(odometry, span_s, hold_height=decision.stop)
         draw = np.zeros(4) if fault else self._motion.coupling(odometry, self._admittance.mass)
 
         fault = _fault(wrench)

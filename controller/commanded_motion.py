@@ -59,10 +59,12 @@ class CommandedMotion:
         result: Floats = self._rate * mass * excess
         return result
 
-    def follow(self, odometry: Odometry, span_s: float) -> None:
-        """Draw the commanded pose to the measured one."""
+    def follow(self, odometry: Odometry, span_s: float, hold_height: bool) -> None:
+        """Draw the commanded pose to the measured one; not the height of a column that is to hold, however it sags."""
         apart = measured_pose(odometry) - self.pose
         apart[YAW] = math.remainder(apart[YAW], 2.0 * math.pi)
+        if hold_height:
+            apart[3] = 0.0
         self.pose += min(self._pose_rate * span_s, 1.0) * apart
         self.pose[3] = min(max(self.pose[3], self._stroke_m[0]), self._stroke_m[1])
 

@@ -168,6 +168,15 @@ def test_stop_states_bring_base_and_column_to_rest() -> None:
         assert np.diff(velocities(commands)[:, 0]).max() <= 1e-9  # never pushes on
 
 
+def test_a_column_that_sags_in_a_stop_is_held_where_it_was_told_to_be() -> None:
+    loop = Loop()
+    loop.run(0.2, np.zeros(6))
+    held = loop.step(state=GaitState.SAFE_STOP).column_height
+    loop.pose[3] -= 0.05
+    commands = loop.run(0.5, np.zeros(6), state=GaitState.SAFE_STOP)
+    assert commands[-1].column_height == pytest.approx(held, abs=1e-4)
+
+
 def test_the_command_carries_the_decision_and_what_is_rendered() -> None:
     loop = Loop()
     command = loop.step(np.zeros(6), 1.0, GaitState.ARREST)
