@@ -132,10 +132,14 @@ def measure(seconds: float, with_reference: bool) -> dict[str, Any]:
         pose = pose + PERIOD_S * np.concatenate([turn @ velocity[:2], velocity[2:]])
         now_ns += int(PERIOD_S * NS)
     gc.enable()
+    whole = percentiles([1e3 * value for value in core])
     return {
         "steps": len(wall),
+        "median_ms": whole["p50_ms"],
+        "p99_ms": whole["p99_ms"],
+        "max_ms": whole["max_ms"],
         "wall": percentiles([1e3 * value for value in wall]),
-        "core": percentiles([1e3 * value for value in core]),
+        "core": whole,
         "solver": percentiles([1e3 * value for value in solving]),
         "iterations": {"p50": float(np.median(iterations)), "p99": float(np.percentile(iterations, 99))},
         "max_error_u0": max(errors, default=float("nan")),
