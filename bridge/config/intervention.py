@@ -21,10 +21,10 @@ class InterventionConfig(Section):
     distance_full_sd: float = Field(default=-0.5, ge=-20, le=20)
     """Signed distance at which the risk is full [within-class standard deviations]; negative is past the boundary."""
 
-    approach_onset_s: float = Field(default=0.6, gt=0, le=10)
+    approach_onset_s: float = Field(default=0.8, gt=0, le=10)
     """Time to the boundary (distance over closing rate) below which an approach counts [s]."""
 
-    approach_full_s: float = Field(default=0.15, ge=0, le=10)
+    approach_full_s: float = Field(default=0.3, ge=0, le=10)
     """Time to the boundary at which an approach counts fully [s]."""
 
     approach_far_sd: float = Field(default=3.5, ge=-20, le=20)
@@ -32,6 +32,15 @@ class InterventionConfig(Section):
 
     approach_near_sd: float = Field(default=2.0, ge=-20, le=20)
     """Within this distance an approach counts in full [within-class standard deviations]."""
+
+    credible_onset: float = Field(default=0.3, ge=0, le=1)
+    """Distance and approach count nothing while the probability of transient and fall together is below this."""
+
+    credible_full: float = Field(default=0.7, ge=0, le=1)
+    """From this probability of transient and fall together on, distance and approach count fully."""
+
+    unconfirmed_most: float = Field(default=0.7, ge=0, le=1)
+    """Largest risk by distance and approach alone; a fall foreseen with `probability_full` lifts the limit."""
 
     probability_onset: float = Field(default=0.35, ge=0, le=1)
     """Probability of fall above which risk begins."""
@@ -63,6 +72,7 @@ class InterventionConfig(Section):
             ("distance_full_sd", "distance_onset_sd"),
             ("approach_full_s", "approach_onset_s"),
             ("approach_near_sd", "approach_far_sd"),
+            ("credible_onset", "credible_full"),
             ("probability_onset", "probability_full"),
             ("release_per_s", "rise_per_s"),
             ("rise_per_s", "arrest_per_s"),

@@ -21,7 +21,7 @@ class Risk(NamedTuple):
 
 def ramp(value: Floats, onset: float, full: float) -> Floats:
     """Return 0 up to `onset`, 1 from `full` on and the line between; `full` may lie below `onset`."""
-    return np.clip((value - onset) / (full - onset), 0.0, 1.0)
+    return (np.clip(value, min(onset, full), max(onset, full)) - onset) / (full - onset)
 
 
 def time_to_boundary(distance: Floats, rate: Floats) -> Floats:
@@ -39,12 +39,20 @@ def assess_risk(horizon: FallHorizon, config: InterventionConfig) -> Risk:
     will be reached at the present rate (counted only within a distance where the rate means
     something), and how probable a fall is. Nearer, faster closing or more probable is never
     less risk. Quality is not part of it: see `KnownRisk`.
+
+    The plane has two dimensions, the classifier has them all: somebody who bends down comes near
+    the boundary. So distance and approach count only as far as the classifier does not call the step stable, and
+    on their own, with no fall foreseen anywhere in the horizon, they stay below `unconfirmed_most`.
     """
     distance, rate = horizon.distance, horizon.distance_rate
-    by_distance = ramp(distance, config.distance_onset_sd, config.distance_full_sd)
+    stable, fall = horizon.probabilities[:, 0], horizon.probabilities[:, 2]
+    by_probability = ramp(fall, config.probability_onset, config.probability_full)
+    credible = ramp(1.0 - stable, config.credible_onset, config.credible_full)
+    most = max(config.unconfirmed_most, float(by_probability.max()))
+    by_distance = np.minimum(credible * ramp(distance, config.distance_onset_sd, config.distance_full_sd), most)
     soon = ramp(time_to_boundary(distance, rate), config.approach_onset_s, config.approach_full_s)
-    by_approach = soon * ramp(distance, config.approach_far_sd, config.approach_near_sd)
-    by_probability = ramp(horizon.probabilities[:, 2], config.probability_onset, config.probability_full)
+    near = ramp(distance, config.approach_far_sd, config.approach_near_sd)
+    by_approach = np.minimum(credible * soon * near, most)
     total = np.maximum(np.maximum(by_distance, by_approach), by_probability)
     return Risk(total, by_distance, by_approach, by_probability)
 

@@ -19,13 +19,15 @@ def horizon(
     rate: Any = 0.0,
     fall: Any = 0.0,
     quality: float = 1.0,
+    transient: Any = None,
     **changes: Any,
 ) -> FallHorizon:
-    """Return a horizon; scalars hold for every step."""
+    """Return a horizon; scalars hold for every step. What is not `fall` is transient, or else as said."""
     probability = np.broadcast_to(np.asarray(fall, dtype=float), (STEPS,))
+    between = 1.0 - probability if transient is None else np.broadcast_to(np.asarray(transient, dtype=float), (STEPS,))
     return FallHorizon(
         stamp_ns=stamp_ns,
-        probabilities=np.stack([1.0 - probability, np.zeros(STEPS), probability], axis=1),
+        probabilities=np.stack([1.0 - between - probability, between, probability], axis=1),
         distance=np.broadcast_to(np.asarray(distance, dtype=float), (STEPS,)),
         distance_rate=np.broadcast_to(np.asarray(rate, dtype=float), (STEPS,)),
         time_to_boundary=np.full(STEPS, np.inf),

@@ -24,11 +24,16 @@ STAGES, STAGE_S = 20, 0.025
 ARMED_S = SupervisorConfig().arm_dwell_s
 
 
+def distance_alone(**changes: Any) -> InterventionConfig:
+    """Thresholds with which the distance arrests without a foreseen fall: these tests drive one cue at a time."""
+    return InterventionConfig(**{"unconfirmed_most": 1.0, **changes})
+
+
 class Person:
     """Runs an intervention in simulated time; horizons come at 30 Hz, wrench and odometry at every step."""
 
     def __init__(self, period_s: float = 0.01, **intervention: Any) -> None:
-        self.intervention = Intervention(InterventionConfig(**intervention), SupervisorConfig(), STAGES, STAGE_S)
+        self.intervention = Intervention(distance_alone(**intervention), SupervisorConfig(), STAGES, STAGE_S)
         self.period_ns = round(period_s * NS)
         self.now_ns = NS
         self.history: list[Decision] = []
@@ -118,7 +123,15 @@ class TestLifeOfAFall:
     def test_walking_is_left_alone(self) -> None:
         rng = np.random.default_rng(1)
         person = Person()
-        person.run(20.0, lambda t: {"distance": 4.5 + rng.normal(0, 0.5), "rate": rng.normal(0, 2.5), "fall": 0.05})
+        person.run(
+            20.0,
+            lambda t: {
+                "distance": 4.5 + rng.normal(0, 0.5),
+                "rate": rng.normal(0, 2.5),
+                "fall": 0.05,
+                "transient": 0.1,
+            },
+        )
         assert person.states() == [GaitState.DISARMED, GaitState.FOLLOW]
         assert max(d.stiffening for d in person.history) < 0.1
 
@@ -228,7 +241,7 @@ class TestReload:
         person = Person()
         person.run(1.0, lambda t: {"distance": 2.0})
         assert person.history[-1].stiffening == 0.0
-        person.intervention.reconfigure(InterventionConfig(distance_onset_sd=6.0, distance_full_sd=3.0))
+        person.intervention.reconfigure(distance_alone(distance_onset_sd=6.0, distance_full_sd=3.0))
         person.history = person.history[-1:]
         person.run(0.02, lambda t: {"distance": 2.0})
         assert 0.0 < person.history[-1].stiffening < 0.2
@@ -240,7 +253,7 @@ class TestReload:
         person = Person(distance_onset_sd=6.0, distance_full_sd=0.0)
         person.run(1.0, lambda t: {"distance": 2.0})
         held = person.history[-1].stiffening
-        person.intervention.reconfigure(InterventionConfig())
+        person.intervention.reconfigure(distance_alone())
         person.run(0.1, lambda t: {"distance": 2.0})
         assert person.history[-1].stiffening == pytest.approx(held - 0.1, abs=0.02)
 

@@ -134,7 +134,7 @@ class TestWalking:
     def test_stiffening_reaches_the_wire(self) -> None:
         bench = Bench()
         bench.run(1.0)
-        bench.person = {"distance": 0.2, "rate": -5.0}
+        bench.person = {"distance": 0.2, "rate": -5.0, "fall": 0.9}
         out = bench.run(0.3)
         assert out.state is GaitState.ARREST
         assert out.stiffening == 1.0
@@ -282,7 +282,9 @@ class TestReload:
     def test_a_valid_change_takes_effect_without_a_jump(self, tmp_path: Path) -> None:
         bench, file = self.bench(tmp_path)
         assert bench.sent[-1].stiffening == 0.0
-        self.change(bench, file, "[intervention]\ndistance_onset_sd = 6.0\ndistance_full_sd = 2.5\n")
+        self.change(
+            bench, file, "[intervention]\ndistance_onset_sd = 6.0\ndistance_full_sd = 2.5\nunconfirmed_most = 1.0\n"
+        )
         out = bench.run(0.3)
         assert out.stiffening == 1.0
         jumps = np.abs(np.diff([c.stiffening for c in bench.sent]))

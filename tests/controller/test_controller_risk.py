@@ -19,7 +19,8 @@ from bridge.messages import STEP_S, STEPS
 from controller.intervention.known_risk import KnownRisk
 from controller.intervention.risk import assess_risk, describe, ramp, time_to_boundary
 
-CONFIG = InterventionConfig()
+CONFIG = InterventionConfig(unconfirmed_most=1.0)  # one cue at a time
+DEFAULTS = InterventionConfig()
 NOW = np.zeros(1)
 
 distances = st.floats(-1000, 1000)
@@ -74,6 +75,28 @@ class TestDefaults:
         assert CONFIG.unknown_risk < SupervisorConfig().arrest_on
 
 
+class TestAgreement:
+    def risk(self, transient: float, fall: float = 0.0, last: float | None = None) -> float:
+        falls = np.full(STEPS, fall)
+        falls[-1] = fall if last is None else last
+        seen = horizon(distance=-1.0, rate=-5.0, fall=falls, transient=np.minimum(transient, 1.0 - falls))
+        return float(assess_risk(seen, DEFAULTS).total[0])
+
+    def test_whom_the_classifier_calls_stable_is_not_at_risk_for_bending_down(self) -> None:
+        assert self.risk(transient=0.0) == 0.0
+        assert self.risk(transient=DEFAULTS.credible_onset) == pytest.approx(0.0)
+        assert 0.0 < self.risk(transient=0.5) < self.risk(transient=0.55) < DEFAULTS.unconfirmed_most
+
+    def test_without_a_foreseen_fall_there_is_no_arrest(self) -> None:
+        assert self.risk(transient=1.0) == DEFAULTS.unconfirmed_most < SupervisorConfig().arrest_on
+        assert self.risk(transient=1.0) >= SupervisorConfig().guard_on
+
+    def test_a_fall_foreseen_anywhere_in_the_horizon_confirms(self) -> None:
+        assert self.risk(transient=1.0, last=DEFAULTS.probability_full) == pytest.approx(1.0)
+        half = 0.5 * (DEFAULTS.probability_onset + DEFAULTS.probability_full)
+        assert self.risk(transient=1.0, last=half) == pytest.approx(DEFAULTS.unconfirmed_most)
+
+
 class TestCues:
     def test_thresholds_are_where_they_say(self) -> None:
         assert total(CONFIG.distance_onset_sd) == 0.0
@@ -112,7 +135,7 @@ class TestConfig:
         ("setting", "words"),
         [
             ("intervention.distance_full_sd=2.0", "distance_full_sd = 2 must be below distance_onset_sd = 1.5"),
-            ("intervention.approach_full_s=0.6", "approach_full_s = 0.6 must be below approach_onset_s = 0.6"),
+            ("intervention.approach_full_s=0.8", "approach_full_s = 0.8 must be below approach_onset_s = 0.8"),
             ("intervention.approach_near_sd=4", "approach_near_sd = 4 must be below approach_far_sd = 3.5"),
             ("intervention.probability_full=0.2", "probability_onset = 0.35 must be below probability_full = 0.2"),
             ("intervention.release_per_s=9", "release_per_s = 9 must be below rise_per_s = 8"),
@@ -150,7 +173,7 @@ class TestWords:
 
 class TestKnownRisk:
     def make(self, **changes: Any) -> KnownRisk:
-        return KnownRisk(InterventionConfig(**changes))
+        return KnownRisk(InterventionConfig(**{"unconfirmed_most": 1.0, **changes}))
 
     def test_nothing_known_yet(self) -> None:
         known = self.make()
