@@ -15,11 +15,11 @@ from bridge.inbox import Inbox
 from bridge.messages import FallHorizon, Keypoints, NodeStatus
 from bridge.node import NodeContext, main
 from bridge.outbox import Outbox
+from bridge.timing import RecentRate
 from bridge.topics import FALL_HORIZON, KEYPOINTS
 
 _WAIT_S = 0.05
 _REPEAT_S = 0.1  # how often a fault that lasts is said again
-_RATE_OVER_S = 2.0
 
 
 class AnticipationNode:
@@ -42,7 +42,7 @@ class AnticipationNode:
         self._stamp_ns: int | None = None  # of the newest keypoints
         self._newest: FallHorizon | None = None
         self._complained_ns: int | None = None  # since the last keypoints
-        self._steps_ns: deque[int] = deque(maxlen=256)
+        self._rate = RecentRate()
         self._took_ms: deque[float] = deque(maxlen=256)
 
     def step(self, now_ns: int) -> None:
@@ -59,7 +59,7 @@ class AnticipationNode:
             self._predictor.push(message)
         self._publish(self._horizon(messages[-1].stamp_ns, now_ns))
         self._complained_ns = None
-        self._steps_ns.append(now_ns)
+        self._rate.note(now_ns)
         self._took_ms.append((self._clock.now_ns() - started_ns) / 1e6)
 
     def wait(self) -> None:
@@ -76,7 +76,7 @@ class AnticipationNode:
             level, summary = (2 if self._complained_ns is not None else 1), newest.reason
         age_ms = "" if self._stamp_ns is None else f"{(now_ns - self._stamp_ns) / 1e6:.0f}"
         values = {
-            "rate_hz": f"{self._rate_hz(now_ns):.1f}",
+            "rate_hz": f"{self._rate.rate_hz(now_ns):.1f}",
             "keypoints_age_ms": age_ms,
             "inference_p99_ms": f"{np.percentile(self._took_ms, 99):.2f}" if self._took_ms else "",
             "quality": "" if newest is None else f"{newest.quality:.2f}",
@@ -116,12 +116,6 @@ class AnticipationNode:
             self._log.info("%s", "foreseeing" if horizon.valid else horizon.reason)
         self._newest = horizon
         self._outbox.send(horizon)
-
-    def _rate_hz(self, now_ns: int) -> float:
-        recent = [stamp for stamp in self._steps_ns if now_ns - stamp < _RATE_OVER_S * NS]
-        if len(recent) < 2 or recent[-1] == recent[0]:
-            return 0.0
-        return (len(recent) - 1) * NS / (recent[-1] - recent[0])
 
 
 def create(context: NodeContext) -> AnticipationNode:

@@ -1,8 +1,12 @@
-"""How regularly a loop turns."""
+"""How regularly a loop turns, and how often something happens."""
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
+
+from bridge.clock import NS
 
 
 class LoopTiming:
@@ -33,3 +37,23 @@ class LoopTiming:
         """Return the 99th percentile of the periods in the ring [s]; 0 before the second turn."""
         known = self._periods_ns[: min(self._count, len(self._periods_ns))]
         return float(np.percentile(known, 99)) / 1e9 if len(known) else 0.0
+
+
+class RecentRate:
+    """Rate of something that happens now and then, over the newest two seconds."""
+
+    SPAN_NS = 2 * NS
+
+    def __init__(self) -> None:
+        self._stamps_ns: deque[int] = deque(maxlen=1024)
+
+    def note(self, now_ns: int) -> None:
+        """Note that it happened."""
+        self._stamps_ns.append(now_ns)
+
+    def rate_hz(self, now_ns: int) -> float:
+        """Return the rate [Hz]; 0 where it happened less than twice."""
+        recent = [stamp for stamp in self._stamps_ns if now_ns - stamp < self.SPAN_NS]
+        if len(recent) < 2 or recent[-1] == recent[0]:
+            return 0.0
+        return (len(recent) - 1) * NS / (recent[-1] - recent[0])

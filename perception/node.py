@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections import deque
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from bridge.errors import SurefootError
 from bridge.messages import Floats, Keypoints, KeypointStatus, NodeStatus
 from bridge.node import NodeContext, main
 from bridge.outbox import Outbox
+from bridge.timing import RecentRate
 from bridge.topics import KEYPOINTS
 from perception.estimators.interface import PoseEstimator, load_estimator
 from perception.pipeline import PerceptionPipeline
@@ -22,7 +22,6 @@ from perception.sources.picture import parse_crop
 
 _MOST_FRAMES_A_STEP = 8  # so that a fast source cannot keep the loop from its status and its signals
 _STALL_REPEAT_S = 0.1
-_RATE_OVER_S = 2.0
 
 
 class PerceptionNode:
@@ -52,7 +51,7 @@ class PerceptionNode:
         self._log = log
         self._started_ns: int | None = None
         self._newest: Frame | None = None
-        self._ticks_ns: deque[int] = deque(maxlen=256)
+        self._rate = RecentRate()
         self._last: Keypoints | None = None
         self._stall_said_ns = 0
 
@@ -84,7 +83,7 @@ class PerceptionNode:
         elif not self._last.valid:
             level, summary = 1, self._last.reason
         values = {
-            "rate_hz": f"{self._rate_hz(now_ns):.1f}",
+            "rate_hz": f"{self._rate.rate_hz(now_ns):.1f}",
             "age_ms": "" if self._newest is None else f"{silent_s * 1e3:.0f}",
             "source": self._source.name,
             "sent": str(self._outbox.sent),
@@ -112,7 +111,7 @@ class PerceptionNode:
             self._outbox.send(message)
             self._tell_change(message)
             self._last = message
-            self._ticks_ns.append(now_ns)
+            self._rate.note(now_ns)
 
     def _tell_change(self, message: Keypoints) -> None:
         """Log when the person is found and lost, not every message."""
@@ -148,12 +147,6 @@ class PerceptionNode:
         self._outbox.send(message)
         self._tell_change(message)
         self._last = message
-
-    def _rate_hz(self, now_ns: int) -> float:
-        recent = [stamp for stamp in self._ticks_ns if now_ns - stamp < _RATE_OVER_S * NS]
-        if len(recent) < 2 or recent[-1] == recent[0]:
-            return 0.0
-        return (len(recent) - 1) * NS / (recent[-1] - recent[0])
 
 
 def create(context: NodeContext) -> PerceptionNode:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bridge.timing import LoopTiming
+from bridge.timing import LoopTiming, RecentRate
 
 MS = 1_000_000
 
@@ -42,3 +42,12 @@ def test_old_turns_are_forgotten() -> None:
         timing.tick(now_ns)
     assert timing.rate_hz() == pytest.approx(100.0)
     assert timing.period_p99_s() == pytest.approx(0.01)
+
+
+def test_recent_rate_forgets_and_does_not_guess() -> None:
+    rate = RecentRate()
+    assert rate.rate_hz(0) == 0.0
+    for k in range(100):
+        rate.note(k * 20_000_000)
+    assert rate.rate_hz(99 * 20_000_000) == pytest.approx(50.0)
+    assert rate.rate_hz(10_000_000_000) == 0.0
