@@ -33,6 +33,15 @@ class AdmittanceStages(NamedTuple):
     load: Floats  # (N, 4) spring forces at the present pose [N, N, N m, N]
 
 
+class _Rendered(NamedTuple):
+    """What a profile asks for if the tank can pay. Shared between steps: not to be written to."""
+
+    damping: Floats  # (N, 4)
+    stiffness: Floats  # (N, 4) K
+    total: Floats  # (N, 4) K + K_hold
+    onset: int  # first stage that stiffens, 0 if none does
+
+
 class EnergyTank:
     """Energy that stiffening may spend [J]."""
 
@@ -71,6 +80,7 @@ class Admittance:
         self._stage_s = stage_s
         self._fading = fading
         self._drift = self._free_motion()
+        self._last_profile = b""
         self.reset()
 
     def reset(self) -> None:
@@ -92,30 +102,43 @@ class Admittance:
             velocity: (4,) in the base frame.
             force: (4,) generalised force of the person now.
         """
-        s = profile[:, None]
-        damping = self._free + s * self._rise
-        wanted = s**2 * self._arrest
+        rendered = self._rendered(profile)
         hold_load = self.hold[HEIGHT] * (pose[HEIGHT] - self._hold_height)
         if profile[0] <= 0.0:
             # What the spring still stores is the tank's again.
-            self._pay(np.zeros(4), self._displacement(pose))
-            self.anchor = None
-            onset = int(np.argmax(profile > 0.0))
+            if self.anchor is not None:
+                self._pay(np.zeros(4), self._displacement(pose))
+                self.anchor = None
+            onset, stiffness, total = rendered.onset, rendered.stiffness, rendered.total
             displacement = -self._coast(onset, velocity, force, hold_load) if onset else np.zeros(4)
-            stiffness = wanted
         else:
             if self.anchor is None:
                 self.anchor = pose.copy()
             self._slip(pose)
             displacement = self._displacement(pose)
-            change = wanted - self.stiffness
+            stiffness, total = rendered.stiffness, rendered.total
+            change = stiffness - self.stiffness
             cost = 0.5 * change @ displacement**2
-            share = np.where(cost > self.tank.energy_j, self.tank.energy_j / np.maximum(cost, 1e-12), 1.0)
-            stiffness = self.stiffness + share[:, None] * change
+            energy = self.tank.energy_j
+            if not cost.max() <= energy:
+                share = np.where(cost > energy, energy / np.maximum(cost, 1e-12), 1.0)
+                stiffness = self.stiffness + share[:, None] * change
+                total = stiffness + self.hold
             self._pay(stiffness[0], displacement)
         load = stiffness * displacement
         load[:, HEIGHT] += hold_load
-        return AdmittanceStages(self.mass, damping, stiffness + self.hold, load)
+        return AdmittanceStages(self.mass, rendered.damping, total, load)
+
+    def _rendered(self, profile: Floats) -> _Rendered:
+        """Return what a profile (N,) asks for; a profile that stays, as in free walking, is evaluated once."""
+        key = profile.tobytes()
+        if key != self._last_profile:
+            s = profile[:, None]
+            stiffness = s**2 * self._arrest
+            onset = int(np.argmax(profile > 0.0))
+            self._last_rendered = _Rendered(self._free + s * self._rise, stiffness, stiffness + self.hold, onset)
+            self._last_profile = key
+        return self._last_rendered
 
     def settle(self, before: Floats, after: Floats, stages: AdmittanceStages, force: Floats, span_s: float) -> None:
         """Book what the damper dissipated while the velocity went from `before` to `after` (4,) in `span_s`.

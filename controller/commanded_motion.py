@@ -55,30 +55,41 @@ class CommandedMotion:
     def coupling(self, odometry: Odometry, mass: Floats) -> Floats:
         """Return the (4,) force that draws the commanded velocity to the measured one beyond the tolerance."""
         apart = measured_velocity(odometry) - self.velocity
+        if max(map(abs, apart.tolist())) <= self._tolerance:
+            return np.zeros(4)
         excess = np.sign(apart) * np.maximum(np.abs(apart) - self._tolerance, 0.0)
         result: Floats = self._rate * mass * excess
         return result
 
     def follow(self, odometry: Odometry, span_s: float, hold_height: bool) -> None:
         """Draw the commanded pose to the measured one; not the height of a column that is to hold, however it sags."""
-        apart = measured_pose(odometry) - self.pose
-        apart[YAW] = math.remainder(apart[YAW], 2.0 * math.pi)
-        if hold_height:
-            apart[3] = 0.0
-        self.pose += min(self._pose_rate * span_s, 1.0) * apart
-        self.pose[3] = min(max(self.pose[3], self._stroke_m[0]), self._stroke_m[1])
+        share = min(self._pose_rate * span_s, 1.0)
+        x, y, yaw, height = self.pose.tolist()
+        measured_x, measured_y, measured_height = odometry.position.tolist()
+        turned = math.remainder(odometry.yaw - yaw, 2.0 * math.pi)
+        if not hold_height:
+            height += share * (measured_height - height)
+        self.pose[:] = (
+            x + share * (measured_x - x),
+            y + share * (measured_y - y),
+            yaw + share * turned,
+            min(max(height, self._stroke_m[0]), self._stroke_m[1]),
+        )
 
     def advance(self, acceleration: Floats, span_s: float) -> None:
         """Apply an acceleration (4,) for `span_s`."""
         before = self.velocity
         self.velocity = before + acceleration * span_s
-        mean = 0.5 * (before + self.velocity)
-        heading = self.pose[YAW] + 0.5 * span_s * mean[YAW]
+        forward, left, turn, column = (0.5 * span_s * (before + self.velocity)).tolist()
+        x, y, yaw, height = self.pose.tolist()
+        heading = yaw + 0.5 * turn
         cosine, sine = math.cos(heading), math.sin(heading)
-        self.pose[0] += span_s * (cosine * mean[0] - sine * mean[1])
-        self.pose[1] += span_s * (sine * mean[0] + cosine * mean[1])
-        self.pose[2:] += span_s * mean[2:]
-        self.pose[3] = min(max(self.pose[3], self._stroke_m[0]), self._stroke_m[1])
+        self.pose[:] = (
+            x + cosine * forward - sine * left,
+            y + sine * forward + cosine * left,
+            yaw + turn,
+            min(max(height + column, self._stroke_m[0]), self._stroke_m[1]),
+        )
         self.acceleration = acceleration
 
 

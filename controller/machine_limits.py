@@ -26,6 +26,7 @@ TRACTION_ROWS = slice(4, 8)
 DRIVE_ROWS = slice(0, 8)
 TIP_ROWS = slice(8, 12)
 ROWS = 12
+_COLUMN = slice(2 * ROWS + 3, None, 4)  # the column's two limits among all
 _TIP_FRONT, _TIP_REAR, _TIP_LEFT, _TIP_RIGHT = 8, 9, 10, 11
 
 
@@ -52,7 +53,10 @@ class MachineLimits:
         self._half = np.array([0.5 * config.wheelbase_m, 0.5 * config.track_m]) - config.support_margin_m
         self._column_force = config.column_force_max_n
         self._acceleration: Floats = np.array(config.acceleration_max)
-        self._shifting = config.carriage_mass_kg * config.column_acceleration_max_m_s2
+        # The column's own acceleration may take this much load off the floor; the rest grips.
+        self._grip = 1.0 - config.carriage_mass_kg * config.column_acceleration_max_m_s2 / self._weight
+        self._drive_high: Floats = np.repeat([1.0, self._grip], 4)
+        self._drive_low: Floats = -self._drive_high
         self._wheel_map: Floats = walker.wheel_force / config.wheel_torque_max_nm
         angles = np.pi / 8 + np.arange(4) * np.pi / 4
         # The octagon lies inside the circle: its faces are cos(22.5 deg) of the radius away.
@@ -68,6 +72,11 @@ class MachineLimits:
             axis, sign = edge // 2, 1.0 - 2.0 * (edge % 2)
             self._edges[edge, axis] = sign / (self._weight * self._half[axis])
             self._edges[edge, 2] = -1.0 / self._weight
+        # Limits without a wrench and their change by a whole one, refilled at every step; tip-over has no lower limit.
+        self._lines: Floats = np.zeros((2, 2 * ROWS + 8))
+        self._at_none, self._slope = _parts(self._lines[0]), _parts(self._lines[1])
+        self._at_none.low[TIP_ROWS] = -np.inf
+        self._at_none.box_low[:], self._at_none.box_high[:] = -self._acceleration, self._acceleration
         self.linearise(walker.terms)
 
     def linearise(self, terms: WalkerTerms) -> None:
@@ -85,30 +94,37 @@ class MachineLimits:
             wrench: (6,) force [N], then torque [N m], at the interface.
             fading: (stages,) from 0 to 1.
         """
-        left = fading[:, None]
         push = wrench @ terms.interface
         # What each row would carry at no acceleration, without the person and by the person.
         alone, by_person = self._drive_map @ terms.bias[:3], self._drive_map @ push[:3]
-        carried = alone - left * by_person
-        # The column's own acceleration may take this much load off the floor; less than none grips nothing.
-        grip = np.maximum((self._weight - self._shifting - left * wrench[2]) / self._weight, 0.0)
         resting, pushed = moments_at_rest(terms, self._weight, wrench)
-        stages = len(fading)
-        low, high = np.empty((stages, ROWS)), np.empty((stages, ROWS))
-        low[:, WHEEL_ROWS] = -1.0
-        low[:, TRACTION_ROWS] = -grip
-        np.negative(low[:, DRIVE_ROWS], out=high[:, DRIVE_ROWS])
-        low[:, DRIVE_ROWS] -= carried
-        high[:, DRIVE_ROWS] -= carried
-        low[:, TIP_ROWS] = -np.inf
-        high[:, TIP_ROWS] = -(self._edges @ resting) - left * (self._edges @ pushed)
-        inertia, most = terms.mass[3, 3], self._acceleration[3]
-        load = terms.bias[3] - fading * push[3]
-        box_low, box_high = np.empty((stages, 4)), np.empty((stages, 4))
-        box_low[:], box_high[:] = -self._acceleration, self._acceleration
-        box_low[:, 3] = np.minimum(np.maximum((-self._column_force - load) / inertia, -most), most)
-        box_high[:, 3] = np.minimum(np.maximum((self._column_force - load) / inertia, -most), most)
-        return MachineBounds(low, high, box_low, box_high)
+        lifted = float(wrench[2]) / self._weight
+        inertia = float(terms.mass[3, 3])
+        force, load, hanging = (value / inertia for value in (self._column_force, float(terms.bias[3]), float(push[3])))
+
+        # Every limit is a straight line over what is left of the wrench.
+        at_none, slope = self._at_none, self._slope
+        np.subtract(self._drive_low, alone, out=at_none.low[DRIVE_ROWS])
+        np.subtract(self._drive_high, alone, out=at_none.high[DRIVE_ROWS])
+        slope.low[DRIVE_ROWS] = slope.high[DRIVE_ROWS] = by_person
+        slope.low[TRACTION_ROWS] += lifted
+        slope.high[TRACTION_ROWS] -= lifted
+        at_none.high[TIP_ROWS] = -(self._edges @ resting)
+        slope.high[TIP_ROWS] = -(self._edges @ pushed)
+        at_none.box_low[3], at_none.box_high[3] = -force - load, force - load
+        slope.box_low[3] = slope.box_high[3] = hanging
+        values = fading[:, None] * self._lines[1]
+        values += self._lines[0]
+        bounds = _parts(values)
+        if min(self._grip, self._grip - lifted) < 0.0:
+            # Less load than none grips nothing.
+            missing = np.maximum(fading * lifted - self._grip, 0.0)[:, None]
+            bounds.low[:, TRACTION_ROWS] -= missing
+            bounds.high[:, TRACTION_ROWS] += missing
+        column = values[:, _COLUMN]
+        most = float(self._acceleration[3])
+        np.minimum(np.maximum(column, -most, out=column), most, out=column)
+        return bounds
 
     def give_way(self, terms: WalkerTerms, wrench: Floats, bounds: MachineBounds) -> Floats:
         """Return the (4,) acceleration nearest to rest that the machine can hold under the present `wrench` (6,).
@@ -119,7 +135,7 @@ class MachineLimits:
         low, high = bounds.low[0], bounds.high[0]
         value = np.zeros(4)
         value[3] = min(max(0.0, float(bounds.box_low[0, 3])), float(bounds.box_high[0, 3]))
-        if (low <= 0.0).all() and (high >= 0.0).all():
+        if max(low.tolist()) <= 0.0 <= min(high.tolist()):
             return value
         middle = 0.5 * (low[DRIVE_ROWS] + high[DRIVE_ROWS])
         width = 0.5 * (high[DRIVE_ROWS] - low[DRIVE_ROWS])
@@ -134,6 +150,16 @@ class MachineLimits:
             )
             value[axis] = min(max(float(value[axis]), least), most) if least <= most else 0.5 * (least + most)
         return np.clip(value, -self._acceleration, self._acceleration)
+
+
+def _parts(values: Floats) -> MachineBounds:
+    """Return views of the limits in `values` (..., 32)."""
+    return MachineBounds(
+        values[..., :ROWS],
+        values[..., ROWS : 2 * ROWS],
+        values[..., 2 * ROWS : 2 * ROWS + 4],
+        values[..., 2 * ROWS + 4 :],
+    )
 
 
 def moments_by_acceleration(terms: WalkerTerms) -> Floats:

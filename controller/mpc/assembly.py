@@ -76,6 +76,10 @@ class Assembly:
         self._matrix_sources = self._matrix.data.astype(np.int64) - 1
         self._matrix.data[:] = self._A[self._matrix_sources]
         self._motion: Floats = np.zeros((N, 12))
+        self._weights: Floats = 1.0 / (setting.mass * setting.acceleration)
+        self._per_increment: Floats = setting.increment_weight / setting.acceleration
+        self._q_stages = self._q.reshape(N, 12)
+        self._map_law()
         self._map_cost(structure)
         self._map_constraints(structure)
         # How far acceleration can have moved by each stage: one period, then whole stages.
@@ -83,11 +87,16 @@ class Assembly:
         self._reach: Floats = (
             setting.jerk * (setting.period_s + setting.stage_s * np.arange(N, dtype=np.float64))[:, None]
         )
-        self._weights: Floats = 1.0 / (setting.mass * setting.acceleration)
         self._per_first_jerk: Floats = JERK_SCALE / (setting.jerk * setting.period_s)
-        self._displacement = setting.displacement
+        dt = setting.stage_s
+        self._ramp: Floats = np.zeros((N, 4))
+        sums = dt * np.tri(N)
+        # dt (v_0 + ... + v_k) with half of the first and last, for speeds that are sums themselves.
+        self._sums: Floats = np.concatenate([sums, dt * (np.tri(N) - 0.5 * np.eye(N)) @ sums])
+        self._ends: Floats = dt * np.arange(1.0, N + 1)[:, None]
+        self._per_velocity, self._per_displacement = 1.0 / setting.velocity, 1.0 / setting.displacement
         self._law: tuple[bytes, bytes] | None = None
-        self._tip: Floats = machine_rows[TIP_ROWS].copy()
+        self._tip = machine_rows[TIP_ROWS].tobytes()
 
     def fill(
         self,
@@ -118,22 +127,27 @@ class Assembly:
         return Problem(self._P, self._q, self._A, self._l, self._u, changed)
 
     def _map_cost(self, structure: Structure) -> None:
-        """Find where each product of residual coefficients goes; the increments' part is there already."""
+        """Find the product of residual coefficients that each entry holds; the increments' part is there already."""
         N, pattern = self._setting.stages, structure.cost
         self._increments: Floats = self._P.copy()
         first = np.array([pattern.position(axis, axis) for axis in range(4)])
-        pairs = np.empty((6, N - 1, 4), dtype=np.int64)
+        pairs = np.empty((6, N, 4), dtype=np.int64)
+        pairs[:, 0] = len(self._P)
+        pairs[2, 0] = first
         for k in range(1, N):
             for axis in range(4):
                 a = acceleration_index(k, axis)
                 v, p = velocity_index(k - 1, axis), displacement_index(k - 1, axis)
                 # Columns in order of index: v and p of the stage before come first.
                 for pair, (row, column) in enumerate(((v, v), (p, p), (a, a), (v, p), (v, a), (p, a))):
-                    pairs[pair, k - 1, axis] = pattern.position(row, column)
-        self._cost_first, self._cost_pairs = first, pairs
+                    pairs[pair, k, axis] = pattern.position(row, column)
+        # At stage 0 velocity and displacement are given; their products go nowhere. What has no product takes a zero.
+        self._products: Floats = np.zeros(6 * N * 4 + 1)
+        source = np.full(len(self._P) + 1, 6 * N * 4)
+        source[pairs.ravel()] = np.arange(6 * N * 4)
+        self._cost_sources = source[:-1]
         # Built at D = K = 0 the values hold the mass's part too; take it out to be left with the increments.
-        self._increments[first] -= 1.0
-        self._increments[pairs[2]] -= 1.0
+        self._increments[pairs[2].ravel()] -= 1.0
 
     def _map_constraints(self, structure: Structure) -> None:
         rows = structure.rows["tip_over"]
@@ -147,57 +161,66 @@ class Assembly:
             ]
         )
 
-    def _coefficients(self, law: AdmittanceStages) -> tuple[Floats, Floats, Floats]:
-        """Return what the scaled a, v, p weigh in each residual (N, 4); at stage 0 v and p are given."""
+    def _map_law(self) -> None:
+        """Write what damping and stiffness (N, 4) weigh in the scaled coefficients of each residual."""
         setting = self._setting
         half = np.full((setting.stages, 1), 0.5 * setting.stage_s)
         half[0] = 0.5 * setting.period_s
-        by_v = law.damping + half * law.stiffness
-        by_a = law.mass + half * law.damping + half**2 * law.stiffness
-        scale = self._weights
-        return (
-            by_a * (setting.acceleration * scale),
-            by_v * (setting.velocity * scale),
-            law.stiffness * (setting.displacement * scale),
+        by_a, by_v, by_p = (
+            scale * self._weights for scale in (setting.acceleration, setting.velocity, setting.displacement)
         )
+        self._mass_by_a: Floats = setting.mass * by_a
+        ones = np.ones_like(half)
+        self._damping_by: Floats = np.stack([half * by_a, ones * by_v])
+        self._stiffness_by: Floats = np.stack([half**2 * by_a, half * by_v, ones * by_p])
+        self._by: Floats = np.zeros((3, setting.stages, 4))
 
     def _fill_matrices(self, law: AdmittanceStages, machine_rows: Floats) -> bool:
         key = (law.damping.tobytes(), law.stiffness.tobytes())
         changed = False
         if key != self._law:
             self._law = key
-            self._by_a, self._by_v, self._by_p = self._coefficients(law)
-            a, v, p = self._by_a[1:], self._by_v[1:], self._by_p[1:]
-            self._P[:] = self._increments
-            self._P[self._cost_first] += self._by_a[0] ** 2
-            self._P[self._cost_pairs] += np.stack([v * v, p * p, a * a, v * p, v * a, p * a])
+            # What the scaled a, v, p weigh in each residual (N, 4); at stage 0 v and p are given.
+            by = self._by
+            np.multiply(self._stiffness_by, law.stiffness, out=by)
+            by[:2] += self._damping_by * law.damping
+            by[0] += self._mass_by_a
+            a, v, p = by
+            products = self._products[:-1].reshape(6, -1, 4)
+            for pair, (one, other) in enumerate(((v, v), (p, p), (a, a), (v, p), (v, a), (p, a))):
+                np.multiply(one, other, out=products[pair])
+            np.take(self._products, self._cost_sources, out=self._P, mode="clip")
+            self._P += self._increments
             changed = True
-        if not np.array_equal(machine_rows[TIP_ROWS], self._tip):
-            self._tip[:] = machine_rows[TIP_ROWS]
-            self._A[self._tip_positions] = TIP_SCALE * self._tip * self._setting.acceleration
-            self._matrix.data[:] = self._A[self._matrix_sources]
+        if machine_rows[TIP_ROWS].tobytes() != self._tip:
+            self._tip = machine_rows[TIP_ROWS].tobytes()
+            self._A[self._tip_positions] = TIP_SCALE * machine_rows[TIP_ROWS] * self._setting.acceleration
+            np.take(self._A, self._matrix_sources, out=self._matrix.data, mode="clip")
             changed = True
         return changed
 
     def _fill_gradient(self, law: AdmittanceStages, force: Floats, velocity: Floats, previous: Floats) -> None:
         setting = self._setting
-        N = setting.stages
         given = force * -self._weights
-        half = 0.5 * setting.period_s
-        given[0] += (law.damping[0] + half * law.stiffness[0]) * velocity * self._weights
-        stages = self._q.reshape(N, 12)
-        np.multiply(self._by_a, given, out=stages[:, 0:4])
-        stages[0, 0:4] -= setting.increment_weight * previous / setting.acceleration
-        np.multiply(self._by_v[1:], given[1:], out=stages[:-1, 4:8])
-        np.multiply(self._by_p[1:], given[1:], out=stages[:-1, 8:12])
+        given[0] += (law.damping[0] + (0.5 * setting.period_s) * law.stiffness[0]) * velocity * self._weights
+        by_a, by_v, by_p = self._by
+        # Velocity and displacement of a stage's end enter the residual of the stage after.
+        stages = self._q_stages
+        np.multiply(by_a, given, out=stages[:, 0:4])
+        stages[0, 0:4] -= self._per_increment * previous
+        np.multiply(by_v[1:], given[1:], out=stages[:-1, 4:8])
+        np.multiply(by_p[1:], given[1:], out=stages[:-1, 8:12])
 
     def _give_way_motion(self, give_way: Floats, velocity: Floats, previous: Floats) -> Floats:
         """Return, as a decision, the motion that ramps to `give_way`, and back before velocity leaves its limit."""
         setting = self._setting
-        dt = setting.stage_s
-        ramp: Floats = previous + np.minimum(np.maximum(give_way - previous, -self._reach), self._reach)
+        N, dt = setting.stages, setting.stage_s
+        ramp = give_way - previous
+        np.minimum(np.maximum(ramp, -self._reach), self._reach, out=self._ramp)
+        ramp = self._ramp
+        ramp += previous
         count = self._count
-        for axis in np.flatnonzero(give_way):
+        for axis in [axis for axis, value in enumerate(give_way.tolist()) if value != 0.0]:
             sign = np.sign(give_way[axis])
             # One row for each stage at which to begin fading; the last that ends inside the limit is taken.
             fade = setting.jerk[axis] * dt * np.maximum(count - count[:, None], 0)
@@ -206,13 +229,12 @@ class Assembly:
             end = sign * velocity[axis] + dt * options.sum(axis=1)
             best = max(int(np.sum(end <= (1.0 - _RESERVE) * setting.velocity[axis])) - 1, 0)
             ramp[:, axis] = sign * options[best]
-        speed = velocity + dt * ramp.cumsum(axis=0)
-        way = dt * (speed.cumsum(axis=0) + 0.5 * (velocity - speed))
-        motion = self._motion
-        np.divide(ramp, setting.acceleration, out=motion[:, 0:4])
-        np.divide(speed, setting.velocity, out=motion[:, 4:8])
-        np.divide(way, self._displacement, out=motion[:, 8:12])
-        return motion.ravel()
+        # Velocity and displacement at each stage's end are sums over the accelerations until then.
+        speed = self._sums @ ramp
+        np.divide(ramp, setting.acceleration, out=self._motion[:, 0:4])
+        np.multiply(speed[:N] + velocity, self._per_velocity, out=self._motion[:, 4:8])
+        np.multiply(speed[N:] + self._ends * velocity, self._per_displacement, out=self._motion[:, 8:12])
+        return self._motion.ravel()
 
     def _fill_bounds(
         self,
@@ -223,19 +245,24 @@ class Assembly:
         give_way: Floats,
     ) -> None:
         setting, limits = self._setting, self._limits
-        for side in limits["velocity_dynamics"]:
-            np.multiply(velocity, 4.0 / setting.velocity, out=side[0])
+        share = velocity * self._per_velocity
         for side in limits["displacement_dynamics"]:
-            np.divide(velocity, setting.velocity, out=side[0])
+            side[0] = share
+        share *= 4.0
+        for side in limits["velocity_dynamics"]:
+            side[0] = share
         low, high = limits["acceleration"]
-        low[:, 3] = bounds.box_low[:, 3] / setting.acceleration[3]
-        high[:, 3] = bounds.box_high[:, 3] / setting.acceleration[3]
+        most = setting.acceleration[3]
+        np.divide(bounds.box_low[:, 3], most, out=low[:, 3])
+        np.divide(bounds.box_high[:, 3], most, out=high[:, 3])
         low, high = limits["jerk"]
         shift = previous * self._per_first_jerk
-        low[0], high[0] = shift - JERK_SCALE, shift + JERK_SCALE
+        np.subtract(shift, JERK_SCALE, out=low[0])
+        np.add(shift, JERK_SCALE, out=high[0])
         low, high = limits["stroke"]
-        scale = setting.displacement[3]
-        low[:], high[:] = (self._stroke_m[0] - height_m) / scale, (self._stroke_m[1] - height_m) / scale
+        scale = float(setting.displacement[3])
+        low.fill((self._stroke_m[0] - height_m) / scale)
+        high.fill((self._stroke_m[1] - height_m) / scale)
         low, high = limits["drive"]
         np.multiply(bounds.low[self._sparse, DRIVE_ROWS], DRIVE_SCALE, out=low)
         np.multiply(bounds.high[self._sparse, DRIVE_ROWS], DRIVE_SCALE, out=high)
@@ -245,6 +272,7 @@ class Assembly:
         needed: Floats = np.asarray(self._matrix @ self._give_way_motion(give_way, velocity, previous))
         first = self._first_limit
         np.minimum(self._low, needed - self._opening, out=self._l)
-        np.maximum(self._high, needed + self._opening, out=self._u)
+        needed += self._opening
+        np.maximum(self._high, needed, out=self._u)
         self._l[:first] = self._low[:first]
         self._u[:first] = self._high[:first]

@@ -22,7 +22,9 @@ class Problem(NamedTuple):
 
     def flaw(self) -> str:
         """Return the name of what is not a number or crossed, '' if all is well."""
-        for name, values in (("P", self.P), ("q", self.q), ("A", self.A)):
+        # Matrices that have not changed have been looked at before, and the solver is not given them again.
+        matrices = (("P", self.P), ("A", self.A)) if self.matrices_changed else ()
+        for name, values in (*matrices, ("q", self.q)):
             # A sum is finite only if every term is.
             if not math.isfinite(values.sum()):
                 return f"{name} of the problem is not finite"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Protocol
 
 import numpy as np
@@ -49,6 +50,9 @@ class OsqpSolver:
         setting = structure.setting
         scale = np.concatenate([setting.acceleration, setting.velocity, setting.displacement])
         self._scale: Floats = np.tile(scale, (setting.stages, 1))
+        self._infinity = float(osqp.constant("OSQP_INFTY"))
+        self._low: Floats = np.zeros(structure.constraints.shape[0])
+        self._high: Floats = np.zeros(structure.constraints.shape[0])
         self._stale = True
 
     def forget(self) -> None:
@@ -63,12 +67,13 @@ class OsqpSolver:
             return Failure(flaw, status="")
         if self._stale:
             self._setup(problem)
-        elif problem.matrices_changed:
-            self._solver.update(q=problem.q, l=problem.l, u=problem.u, Px=problem.P, Ax=problem.A)
         else:
-            self._solver.update(q=problem.q, l=problem.l, u=problem.u)
-        result = self._solver.solve(raise_error=False)
-        info = result.info
+            low, high = self._finite(problem)
+            self._solver.update_data_vec(problem.q, low, high)
+            if problem.matrices_changed:
+                self._solver.update_data_mat(problem.P, None, problem.A, None)
+        self._solver.solve()
+        info = self._solver.info
         status = int(info.status_val)
         spent = float(info.run_time)
         iterations = int(info.iter)
@@ -80,8 +85,10 @@ class OsqpSolver:
             # The iterates are rays or worse: a warm start from them would poison every later solve.
             self._stale = True
             return failure(_REASONS.get(status, "the solver failed"))
-        x, y = np.asarray(result.x), np.asarray(result.y)
-        if not (np.isfinite(x).all() and np.isfinite(y).all()):
+        answer = self._solver.solution
+        x, y = np.asarray(answer.x), np.asarray(answer.y)
+        # A sum is finite only if every term is.
+        if not math.isfinite(float(x.sum()) + float(y.sum())):
             self._stale = True
             return failure("the solver's answer is not finite")
         residuals = self._residuals(problem, x, y)
@@ -93,30 +100,41 @@ class OsqpSolver:
             return failure(f"{_ANSWERED[status]}, {off}" if status != _SOLVED else off, residuals)
         return Plan(x.reshape(self._scale.shape) * self._scale, residuals, iterations, spent)
 
+    def _finite(self, problem: Problem) -> tuple[Floats, Floats]:
+        """Return the bounds with what the solver takes for infinite in the place of what is."""
+        np.maximum(problem.l, -self._infinity, out=self._low)
+        np.minimum(problem.u, self._infinity, out=self._high)
+        return self._low, self._high
+
     def _setup(self, problem: Problem) -> None:
-        config, structure = self._config, self._structure
-        self._solver: Any = osqp.OSQP()
-        self._solver.setup(
-            sparse.csc_matrix((problem.P, structure.cost.indices, structure.cost.indptr), structure.cost.shape),
+        config, cost, constraints = self._config, self._structure.cost, self._structure.constraints
+        # The bindings themselves: osqp.OSQP would copy the bounds, keep every result for derivatives, and take a
+        # tenth of the step for it.
+        bindings: Any = osqp.OSQP().ext
+        settings = bindings.OSQPSettings()
+        bindings.osqp_set_default_settings(settings)
+        settings.verbose = False
+        settings.eps_abs = settings.eps_rel = config.accuracy
+        settings.max_iter = config.max_iterations
+        settings.time_limit = config.time_limit_s
+        settings.check_termination = 10
+        # The problem comes scaled, with rows weighted for the solver; its own scaling undoes that and costs a pass
+        # over the matrices in every update. The step size adapts only after 50 iterations, which ordinary
+        # steps never reach.
+        settings.scaling = 0
+        settings.rho = config.step_size
+        settings.adaptive_rho = 1
+        settings.warm_starting = True
+        low, high = self._finite(problem)
+        self._solver: Any = bindings.OSQPSolver(
+            bindings.CSC(sparse.csc_matrix((problem.P, cost.indices, cost.indptr), cost.shape)),
             problem.q,
-            sparse.csc_matrix(
-                (problem.A, structure.constraints.indices, structure.constraints.indptr), structure.constraints.shape
-            ),
-            problem.l,
-            problem.u,
-            verbose=False,
-            eps_abs=config.accuracy,
-            eps_rel=config.accuracy,
-            max_iter=config.max_iterations,
-            time_limit=config.time_limit_s,
-            check_termination=10,
-            # The problem comes scaled, with rows weighted for the solver; its own scaling undoes that and
-            # costs a pass over the matrices in every update. The step size adapts only after 50 iterations,
-            # which ordinary steps never reach.
-            scaling=0,
-            rho=config.step_size,
-            adaptive_rho=1,
-            warm_starting=True,
+            bindings.CSC(sparse.csc_matrix((problem.A, constraints.indices, constraints.indptr), constraints.shape)),
+            low,
+            high,
+            constraints.shape[0],
+            constraints.shape[1],
+            settings,
         )
         self._stale = False
 
@@ -137,22 +155,31 @@ class ResidualCheck:
         self._matrix = sparse.csr_matrix(sparse.vstack([sparse.hstack([P, A.T]), sparse.hstack([A, 0.0 * A @ A.T])]))
         self._matrix.eliminate_zeros()
         self._sources = self._matrix.data.astype(np.int64) - 1
+        self._values: Floats = np.zeros(count + len(constraints.indices))
+        self._cost_values, self._constraint_values = self._values[:count], self._values[count:]
+        self._answer: Floats = np.zeros(self._matrix.shape[0])
         self._fresh = False
 
     def __call__(self, problem: Problem, x: Floats, y: Floats) -> Residuals:
         """Return the residuals of primal `x` (n,) and multipliers `y` (m,)."""
         if problem.matrices_changed or not self._fresh:
-            self._matrix.data[:] = np.concatenate([problem.P, problem.A])[self._sources]
+            self._cost_values[:], self._constraint_values[:] = problem.P, problem.A
+            np.take(self._values, self._sources, out=self._matrix.data, mode="clip")
             self._fresh = True
-        product: Floats = np.asarray(self._matrix @ np.concatenate([x, y]))
-        pull, value = product[: self._n], product[self._n :]
-        primal = max(float((problem.l - value).max()), float((value - problem.u).max()), 0.0)
-        dual = float(np.abs(pull + problem.q).max()) / (1.0 + float(np.abs(problem.q).max()))
+        n, q = self._n, problem.q
+        self._answer[:n], self._answer[n:] = x, y
+        product: Floats = np.asarray(self._matrix @ self._answer)
+        pull, value = product[:n], product[n:]
         # x'Px from what is there: x'(Px + A'y) - y'Ax.
-        quadratic, linear = float(x @ pull) - float(y @ value), float(problem.q @ x)
+        quadratic, linear = float(x @ pull) - float(y @ value), float(q @ x)
+        pull += q
+        scale = 1.0 + max(float(q.max()), -float(q.min()))
+        dual = max(float(pull.max()), -float(pull.min())) / scale
         # The dual cost takes each multiplier at the bound its sign pushes against; at an open bound that is infinite.
-        with np.errstate(invalid="ignore"):
-            pushing = np.where(y > 0.0, y * problem.u, y * problem.l)
-        support = float(pushing[np.abs(y) > _NO_PUSH].sum())
+        pushing = np.flatnonzero((y > _NO_PUSH) | (y < -_NO_PUSH))
+        force = y[pushing]
+        support = float(force @ np.where(force > 0.0, problem.u[pushing], problem.l[pushing]))
         gap = abs(quadratic + linear + support) / (1.0 + max(abs(quadratic), abs(linear), abs(support)))
+        above = float((value - problem.u).max())
+        primal = max(float(np.subtract(problem.l, value, out=value).max()), above, 0.0)
         return Residuals(primal, dual, gap)

@@ -304,7 +304,9 @@ def test_odometry_that_is_not_a_number_gives_the_fallback_and_says_so(field: str
     assert f"odometry {field} is not finite" in command.reason
 
 
-@pytest.mark.parametrize("profile", [np.full(20, np.nan), np.full(20, 1.2), np.zeros(7)])
+@pytest.mark.parametrize(
+    "profile", [np.full(20, np.nan), np.where(np.arange(20) == 9, np.nan, 0.5), np.full(20, 1.2), np.zeros(7)]
+)
 def test_a_profile_that_makes_no_sense_gives_the_fallback_and_says_so(profile: np.ndarray) -> None:
     loop = Loop()
     loop.run(0.2, [20.0, 0, 0, 0, 0, 0], 0.3)
