@@ -249,9 +249,9 @@ def _fault(message: Odometry | Wrench) -> str:
 def _ordinary(message: Odometry | Wrench) -> bool:
     """Whether a message is far inside what its check allows; of what is not a number that is never true."""
     if isinstance(message, Wrench):
-        return sum(map(abs, message.force.tolist() + message.torque.tolist())) < _ORDINARY_LOAD
+        load: float = sum(map(abs, message.force.tolist() + message.torque.tolist()))
+        return load < _ORDINARY_LOAD
     forward, left, column = message.velocity.tolist()
     x, y, height = message.position.tolist()
-    return abs(forward) + abs(left) + abs(column) + abs(message.yaw_rate) < _ORDINARY_SPEED and math.isfinite(
-        x + y + height + message.yaw
-    )
+    speed: float = abs(forward) + abs(left) + abs(column) + abs(message.yaw_rate)
+    return speed < _ORDINARY_SPEED and math.isfinite(x + y + height + message.yaw)
