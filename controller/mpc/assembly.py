@@ -78,7 +78,6 @@ class Assembly:
         self._motion: Floats = np.zeros((N, 12))
         self._weights: Floats = 1.0 / (setting.mass * setting.acceleration)
         self._per_increment: Floats = setting.increment_weight / setting.acceleration
-        self._q_stages = self._q.reshape(N, 12)
         self._map_law()
         self._map_cost(structure)
         self._map_constraints(structure)
@@ -174,6 +173,16 @@ class Assembly:
         self._damping_by: Floats = np.stack([half * by_a, ones * by_v])
         self._stiffness_by: Floats = np.stack([half**2 * by_a, half * by_v, ones * by_p])
         self._by: Floats = np.zeros((3, setting.stages, 4))
+        self._minus_weights: Floats = np.tile(-self._weights, (setting.stages, 1))
+        # The gradient: acceleration of each stage, velocity and displacement at its end, which enter the residual of
+        # the stage after; the last ones enter none.
+        number = np.arange(self._by.size).reshape(self._by.shape)
+        self._pulls_flat: Floats = np.zeros(self._by.size + 1)
+        self._pulls = self._pulls_flat[:-1].reshape(self._by.shape)
+        sources = np.full((setting.stages, 12), self._by.size)
+        sources[:, 0:4] = number[0]
+        sources[:-1, 4:8], sources[:-1, 8:12] = number[1, 1:], number[2, 1:]
+        self._gradient_sources = sources.ravel()
 
     def _fill_matrices(self, law: AdmittanceStages, machine_rows: Floats) -> bool:
         key = (law.damping.tobytes(), law.stiffness.tobytes())
@@ -201,15 +210,11 @@ class Assembly:
 
     def _fill_gradient(self, law: AdmittanceStages, force: Floats, velocity: Floats, previous: Floats) -> None:
         setting = self._setting
-        given = force * -self._weights
+        given = force * self._minus_weights
         given[0] += (law.damping[0] + (0.5 * setting.period_s) * law.stiffness[0]) * velocity * self._weights
-        by_a, by_v, by_p = self._by
-        # Velocity and displacement of a stage's end enter the residual of the stage after.
-        stages = self._q_stages
-        np.multiply(by_a, given, out=stages[:, 0:4])
-        stages[0, 0:4] -= self._per_increment * previous
-        np.multiply(by_v[1:], given[1:], out=stages[:-1, 4:8])
-        np.multiply(by_p[1:], given[1:], out=stages[:-1, 8:12])
+        np.multiply(self._by, given, out=self._pulls)
+        np.take(self._pulls_flat, self._gradient_sources, out=self._q, mode="clip")
+        self._q[:4] -= self._per_increment * previous
 
     def _give_way_motion(self, give_way: Floats, velocity: Floats, previous: Floats) -> Floats:
         """Return, as a decision, the motion that ramps to `give_way`, and back before velocity leaves its limit."""

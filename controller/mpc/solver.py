@@ -30,6 +30,7 @@ _REASONS = {
     6: "the problem is unbounded",
 }
 _NO_PUSH = 1e-9  # a multiplier this small pushes against nothing
+_MAX = np.maximum.reduce
 
 
 class Solver(Protocol):
@@ -93,7 +94,8 @@ class OsqpSolver:
             return failure("the solver's answer is not finite")
         residuals = self._residuals(problem, x, y)
         worst, limit = max(residuals), self._config.residual_max
-        if worst > limit:
+        # What is not a number is not below the limit either.
+        if not all(value <= limit for value in residuals):
             # Said to be solved and is not: something is wrong with the workspace.
             self._stale = status == _SOLVED
             off = f"the answer is off by {worst:.1e}, limit {limit:.1e}"
@@ -173,13 +175,12 @@ class ResidualCheck:
         # x'Px from what is there: x'(Px + A'y) - y'Ax.
         quadratic, linear = float(x @ pull) - float(y @ value), float(q @ x)
         pull += q
-        scale = 1.0 + max(float(q.max()), -float(q.min()))
-        dual = max(float(pull.max()), -float(pull.min())) / scale
+        dual = float(_MAX(np.abs(pull, out=pull))) / (1.0 + float(_MAX(np.abs(q))))
         # The dual cost takes each multiplier at the bound its sign pushes against; at an open bound that is infinite.
-        pushing = np.flatnonzero((y > _NO_PUSH) | (y < -_NO_PUSH))
+        pushing = (np.abs(y) > _NO_PUSH).nonzero()[0]
         force = y[pushing]
         support = float(force @ np.where(force > 0.0, problem.u[pushing], problem.l[pushing]))
         gap = abs(quadratic + linear + support) / (1.0 + max(abs(quadratic), abs(linear), abs(support)))
-        above = float((value - problem.u).max())
-        primal = max(float(np.subtract(problem.l, value, out=value).max()), above, 0.0)
+        above = float(_MAX(value - problem.u))
+        primal = max(float(_MAX(np.subtract(problem.l, value, out=value))), above, 0.0)
         return Residuals(primal, dual, gap)
