@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from anticipation.checkpoint import Checkpoint, load
 from anticipation.fast_gait_state import FastDirectedGraph
 from anticipation.fast_motion import fast_forecast
+from anticipation.mirror import mirrored
 from anticipation.motion import BASELINES, COORDINATES, HORIZON, WINDOW
 from anticipation.quality import Quality, judge
 from anticipation.transient import fold
@@ -27,7 +28,7 @@ class Predictor:
     """Keeps a person's last half second and foresees the next.
 
     One window is forecast, and one pass of the classifier over the 15 frames seen and the 15 foreseen judges
-    the sixteen windows that end at steps 0..15.
+    the sixteen windows that end at steps 0..15; the same is done with its mirror image, and the logits are averaged.
     """
 
     def __init__(self, checkpoint: Checkpoint, config: AnticipationConfig) -> None:
@@ -105,13 +106,16 @@ class Predictor:
             self._frames[0, :WINDOW] = torch.from_numpy(window)
             self._frames[:, WINDOW:] = self._forecast(self._frames[:, :WINDOW])
             judgement = self._classify(self._frames)
+            # The networks were not made symmetric; the mean with the mirror image is, and errs less.
+            seen = mirrored(self._frames[:, :WINDOW])
+            reflection = self._classify(torch.cat((seen, self._forecast(seen)), dim=1))
             if self._plane.features == "embedding":
                 features = judgement.embedding
             else:  # every window is a stretch of the flattened frames
                 plain = self._plane.features == "window"
                 poses = self._frames if plain else torch.from_numpy(fold(self._frames.numpy()))
                 features = poses.flatten().unfold(0, WINDOW * COORDINATES, COORDINATES)
-            frames, logits = self._frames[0], judgement.logits
+            frames, logits = self._frames[0], 0.5 * (judgement.logits + reflection.logits)
             return frames.double().numpy(), logits.double().numpy(), features.double().numpy()
 
     def _probabilities(self, logits: Floats, quality: Quality) -> Floats:

@@ -11,7 +11,7 @@ from typing import Final
 import torch
 from torch import Tensor
 
-from perception.skeleton import MIRROR
+from anticipation.mirror import mirrored
 
 SCALE: Final = 0.12  # standard deviation of the log of the scale, per axis: body length and foreshortening
 TILT: Final = 0.10  # standard deviation of the camera's roll [rad]
@@ -31,8 +31,7 @@ def augment(poses: Tensor, generator: torch.Generator) -> Tensor:
     def uniform(*shape: int) -> Tensor:
         return torch.rand(*shape, generator=generator)
 
-    mirrored = poses[:, :, torch.from_numpy(MIRROR.copy())] * torch.tensor([-1.0, 1.0])
-    poses = torch.where(uniform(batch, 1, 1, 1) < 0.5, mirrored, poses)
+    poses = torch.where(uniform(batch, 1, 1, 1) < 0.5, mirrored(poses), poses)
     common, each = SCALE * normal(batch, 1, 1, 1), 0.5 * SCALE * normal(batch, 1, 1, 2)
     poses = poses * torch.exp(common + each)
     angle = TILT * normal(batch)

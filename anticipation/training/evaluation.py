@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from rich.progress import Progress
 from torch import nn
 
+from anticipation.mirror import mirrored
 from anticipation.motion import WINDOW, Forecast, constant_velocity, zero_velocity
 from anticipation.training.clips import FALL, UNLABELLED
 from anticipation.training.corpus import DAILY_STRIDE, Corpus, Shares, Tested, people_folds, shares, tested
@@ -83,11 +84,16 @@ def paper(corpus: Corpus, plan: Plan, seed: int, keypoints: Tested, progress: Pr
 
 
 def predict(classifier: nn.Module, forecast: Forecast, samples: Samples) -> NDArray[np.float32]:
-    """Return logits (M, 16, 3) of the present and the 15 foreseen steps."""
+    """Return logits (M, 16, 3) of the present and the 15 foreseen steps.
+
+    As in `Predictor`, they are the mean of the motion's and its mirror image's.
+    """
     seen = samples.poses[:, :WINDOW]
 
     def run(window: torch.Tensor) -> torch.Tensor:
-        logits: torch.Tensor = classifier(torch.cat((window, forecast(window)), dim=1))
+        sides = (window, mirrored(window))
+        one, other = (classifier(torch.cat((side, forecast(side)), dim=1)) for side in sides)
+        logits: torch.Tensor = 0.5 * (one + other)
         return logits
 
     return apply(run, seen)

@@ -8,6 +8,7 @@ import torch
 from anticipation_nets import STANDING, lost, message, nobody, random_checkpoint
 
 from anticipation.checkpoint import load, save
+from anticipation.mirror import mirrored
 from anticipation.motion import LstmForecaster, constant_velocity, zero_velocity
 from anticipation.predictor import Predictor
 from anticipation.transient import fold
@@ -64,7 +65,10 @@ def test_the_sixteen_steps_are_sixteen_windows_judged_one_by_one(features, forec
     with torch.inference_mode():
         frames = torch.cat((seen, checkpoint.forecast(seen)), dim=1)
         windows = torch.cat([frames[:, step : step + 15] for step in range(16)])
-        logits = checkpoint.classifier(windows)[:, 0].double().numpy() / checkpoint.temperature[:, None]
+        reflected = torch.cat((mirrored(seen), checkpoint.forecast(mirrored(seen))), dim=1)
+        reflections = torch.cat([reflected[:, step : step + 15] for step in range(16)])
+        mean = 0.5 * (checkpoint.classifier(windows) + checkpoint.classifier(reflections))
+        logits = mean[:, 0].double().numpy() / checkpoint.temperature[:, None]
         inputs = {
             "window": windows.flatten(1),
             "folded": torch.stack((windows[..., 0].abs(), windows[..., 1]), dim=-1).flatten(1),
@@ -78,6 +82,16 @@ def test_the_sixteen_steps_are_sixteen_windows_judged_one_by_one(features, forec
     np.testing.assert_allclose(horizon.centre_distance, transition.centre_distance, atol=1e-4)
     rate = np.gradient(horizon.distance, STEP_S)
     np.testing.assert_allclose(horizon.distance_rate, rate, atol=1e-9)
+
+
+def test_a_mirrored_person_is_judged_alike():
+    one, other = predictor(), predictor()
+    for tick in range(16):
+        pose = walking(tick)
+        one.push(message(tick, pose))
+        other.push(message(tick, mirrored(torch.from_numpy(pose).float()).double().numpy()))
+    seen, reflected = one.predict(), other.predict()
+    np.testing.assert_allclose(seen.probabilities, reflected.probabilities, atol=1e-4)
 
 
 def test_the_shipped_plane_sees_left_and_right_alike():
