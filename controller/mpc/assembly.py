@@ -86,14 +86,17 @@ class Assembly:
         self._reach: Floats = (
             setting.jerk * (setting.period_s + setting.stage_s * np.arange(N, dtype=np.float64))[:, None]
         )
+        self._reach_down: Floats = -self._reach
         self._per_first_jerk: Floats = JERK_SCALE / (setting.jerk * setting.period_s)
         dt = setting.stage_s
         self._ramp: Floats = np.zeros((N, 4))
         sums = dt * np.tri(N)
         # dt (v_0 + ... + v_k) with half of the first and last, for speeds that are sums themselves.
-        self._sums: Floats = np.concatenate([sums, dt * (np.tri(N) - 0.5 * np.eye(N)) @ sums])
-        self._ends: Floats = dt * np.arange(1.0, N + 1)[:, None]
-        self._per_velocity, self._per_displacement = 1.0 / setting.velocity, 1.0 / setting.displacement
+        self._sums: Floats = np.concatenate([np.eye(N), sums, dt * (np.tri(N) - 0.5 * np.eye(N)) @ sums])
+        self._ends: Floats = np.concatenate([np.zeros(N), np.ones(N), dt * np.arange(1.0, N + 1)])[:, None]
+        limits = np.stack([setting.acceleration, setting.velocity, setting.displacement])
+        self._per_limit: Floats = np.repeat(1.0 / limits, N, axis=0)
+        self._per_velocity: Floats = 1.0 / setting.velocity
         self._law: tuple[bytes, bytes] | None = None
         self._tip = machine_rows[TIP_ROWS].tobytes()
 
@@ -221,7 +224,7 @@ class Assembly:
         setting = self._setting
         N, dt = setting.stages, setting.stage_s
         ramp = give_way - previous
-        np.minimum(np.maximum(ramp, -self._reach), self._reach, out=self._ramp)
+        np.minimum(np.maximum(ramp, self._reach_down), self._reach, out=self._ramp)
         ramp = self._ramp
         ramp += previous
         count = self._count
@@ -234,11 +237,12 @@ class Assembly:
             end = sign * velocity[axis] + dt * options.sum(axis=1)
             best = max(int(np.sum(end <= (1.0 - _RESERVE) * setting.velocity[axis])) - 1, 0)
             ramp[:, axis] = sign * options[best]
-        # Velocity and displacement at each stage's end are sums over the accelerations until then.
-        speed = self._sums @ ramp
-        np.divide(ramp, setting.acceleration, out=self._motion[:, 0:4])
-        np.multiply(speed[:N] + velocity, self._per_velocity, out=self._motion[:, 4:8])
-        np.multiply(speed[N:] + self._ends * velocity, self._per_displacement, out=self._motion[:, 8:12])
+        # Acceleration of each stage; velocity and displacement at its end are sums over the accelerations so far.
+        sums = self._sums @ ramp
+        sums += self._ends * velocity
+        sums *= self._per_limit
+        motion = self._motion.reshape(N, 3, 4)
+        motion[:] = sums.reshape(3, N, 4).transpose(1, 0, 2)
         return self._motion.ravel()
 
     def _fill_bounds(

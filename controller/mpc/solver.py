@@ -55,6 +55,7 @@ class OsqpSolver:
         self._low: Floats = np.zeros(structure.constraints.shape[0])
         self._high: Floats = np.zeros(structure.constraints.shape[0])
         self._stale = True
+        self._adapted = False
 
     def forget(self) -> None:
         """Start the next solve from nothing."""
@@ -69,12 +70,15 @@ class OsqpSolver:
         if self._stale:
             self._setup(problem)
         else:
+            if self._adapted:
+                self._solver.update_rho(self._config.step_size)
             low, high = self._finite(problem)
             self._solver.update_data_vec(problem.q, low, high)
             if problem.matrices_changed:
                 self._solver.update_data_mat(problem.P, None, problem.A, None)
         self._solver.solve()
         info = self._solver.info
+        self._adapted = int(info.rho_updates) > 0
         status = int(info.status_val)
         spent = float(info.run_time)
         iterations = int(info.iter)
@@ -122,7 +126,7 @@ class OsqpSolver:
         settings.check_termination = 10
         # The problem comes scaled, with rows weighted for the solver; its own scaling undoes that and costs a pass
         # over the matrices in every update. The step size adapts only after 50 iterations, which ordinary
-        # steps never reach.
+        # steps do not need; what a hard step made of it is taken back for the next.
         settings.scaling = 0
         settings.rho = config.step_size
         settings.adaptive_rho = 1

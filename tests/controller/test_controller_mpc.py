@@ -316,3 +316,15 @@ def test_an_answer_that_is_not_optimal_is_caught_whatever_the_solver_says(bench:
     failed = solver(bench, accuracy=1e-2).solve(problem._replace(matrices_changed=True))
     assert isinstance(failed, Failure)
     assert "off by" in failed.reason
+
+
+def test_what_a_hard_step_made_of_the_step_size_is_taken_back(bench: Bench) -> None:
+    def problem(sideward_n: float) -> Problem:
+        filled = bench.law.problem(bench.instant([0, sideward_n, -100.0, 0, 0, 0]))
+        return Problem(*(np.array(part) for part in filled[:5]), matrices_changed=True)
+
+    engine = solver(bench)
+    assert isinstance(engine.solve(problem(900.0)), Plan)
+    assert engine._solver.get_settings().rho != CONFIG.step_size
+    assert isinstance(engine.solve(problem(20.0)), Plan)
+    assert engine._solver.get_settings().rho == CONFIG.step_size
