@@ -10,7 +10,6 @@ from the last horizon's arrival to the command's arrival, both at an observer, a
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import random
 import signal
@@ -18,7 +17,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks.live import Live, machine, percentiles
+from benchmarks.live import Live, machine, percentiles, report
 from bridge.clock import SystemClock
 from bridge.launch.launcher import Phase
 from bridge.messages import GaitState
@@ -90,11 +89,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
     result = measure(arguments.times, arguments.controller, arguments.set)
-    text = json.dumps(result, indent=2)
-    print(text)
-    if arguments.json:
-        arguments.json.parent.mkdir(parents=True, exist_ok=True)
-        arguments.json.write_text(text + "\n")
+    report(result, arguments.json)
 
 
 if __name__ == "__main__":

@@ -10,12 +10,11 @@ fifth process); and to the command's own stamp, when the controller began to com
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.live import Live, machine, percentiles
+from benchmarks.live import Live, machine, percentiles, report
 from bridge.clock import NS
 from bridge.messages import SupportCommand
 
@@ -70,11 +69,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     arguments = parser.parse_args()
     result = measure(arguments.seconds, arguments.controller, arguments.set)
-    text = json.dumps(result, indent=2)
-    print(text)
-    if arguments.json:
-        arguments.json.parent.mkdir(parents=True, exist_ok=True)
-        arguments.json.write_text(text + "\n")
+    report(result, arguments.json)
 
 
 if __name__ == "__main__":

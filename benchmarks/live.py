@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import socket
 import time
@@ -122,6 +123,15 @@ def percentiles(values_ms: Sequence[float]) -> dict[str, float]:
 def machine() -> dict[str, Any]:
     """Return what numbers of time depend on."""
     return {"cores": os.cpu_count(), "load_1min": round(os.getloadavg()[0], 2)}
+
+
+def report(result: Mapping[str, Any], file: Path | None) -> None:
+    """Print `result`, and write it to `file` where one is named."""
+    text = json.dumps(result, indent=2)
+    print(text)
+    if file is not None:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text + "\n")
 
 
 def _free_ports() -> list[int]:

@@ -100,11 +100,6 @@ class AdmittanceController:
         """The MPC behind the commands."""
         return self._predictive
 
-    @property
-    def tank_energy_j(self) -> float:
-        """Energy that stiffening may still spend [J]."""
-        return self._admittance.tank.energy_j
-
     def reset(self) -> None:
         """Forget the past: the next step starts from the measured motion."""
         self._admittance.reset()

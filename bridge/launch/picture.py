@@ -183,10 +183,6 @@ def _draw_states(band: Any, panels: Sequence[Any], picture: Picture) -> None:
     band.spines["bottom"].set_visible(False)
 
 
-def _write_in(band: Any, time_s: float, height: float, text: str, colour: str) -> None:
-    band.text(time_s, height, text, ha="center", va="center", fontsize=8.5, color=colour, clip_on=True)
-
-
 def _draw_probabilities(axes: Any, columns: dict[str, Any]) -> None:
     for name, colour in (("stable", STABLE), ("transient", TRANSIENT), ("fall", FALL)):
         axes.fill_between(columns["time_s"], columns[name], color=colour, alpha=0.10, linewidth=0)

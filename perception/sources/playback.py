@@ -44,7 +44,6 @@ class Playback:
         self._paced = paced
         self._origin_ns: int | None = None
         self._upcoming = next(stills, None)
-        self.skipped = 0
         if self._upcoming is None:
             raise SourceError(f"{name}: holds no frame")
         self._gives_images = self._upcoming.image is not None
@@ -75,7 +74,6 @@ class Playback:
         while self._upcoming is not None and self._due(self._upcoming, now_ns - _LATE_NS) and self._paced:
             still = self._upcoming
             self._upcoming = next(self._stills, None)
-            self.skipped += 1
         return Frame(self._origin_ns + still.offset_ns, still.width, still.height, still.image, still.people)
 
     def wait(self, clock: Clock) -> None:
