@@ -54,14 +54,18 @@ def test_age_is_judged_by_the_readers_clock(hub: MemoryHub, clock: ManualClock) 
 
 def test_the_newest_sample_wins_and_late_ones_change_nothing(hub: MemoryHub, clock: ManualClock) -> None:
     inbox = Inbox[Wrench](hub.transport(), WRENCH)
-    for number in (5, 7, 6, 7):
-        payload = encode(WRENCH, wrench(clock.now_ns() - (10 - number), x=number))
+    kept = []
+    for number in (5, 7, 6, 7, 8, 2):
+        # stamps rise all the while: only the number tells that a sample is late
+        payload = encode(WRENCH, wrench(clock.advance(0.001) and clock.now_ns(), x=number))
         inbox._store(Sample(payload, number, b"a" * 16, clock.now_ns()))
         reading = inbox.read(clock.now_ns())
-    assert reading.message is not None
-    assert reading.message.force[0] == 7
-    assert reading.message.sequence == 7
-    assert reading.ok
+        assert reading.message is not None
+        assert reading.ok
+        kept.append((reading.message.force[0], reading.message.sequence, reading.fresh))
+    late = [(7, 7, False), (7, 7, False)]
+    assert kept == [(5, 5, True), (7, 7, True), *late, (8, 8, True), (8, 8, False)]
+    assert inbox.refused == 3
 
 
 def test_a_restarted_publisher_is_followed_but_a_replayed_old_one_is_not(hub: MemoryHub, clock: ManualClock) -> None:
