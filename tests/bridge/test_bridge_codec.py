@@ -186,3 +186,14 @@ def test_every_field_of_our_messages_says_what_it_is(name: str) -> None:
     fields = [line for line in message_definition(name).splitlines() if line and line[0] != "#" and "=" not in line]
     assert len(fields) > 5
     assert all("#" in line for line in fields)
+
+
+@pytest.mark.parametrize("scale", [0.0, 0.5, 0.98, 1.02, 3.0, np.nan])
+def test_an_orientation_that_is_no_rotation_is_refused(scale: float) -> None:
+    from bridge.codec import TYPES
+
+    raw = TYPES.deserialize_cdr(encode(ODOMETRY, EXAMPLES[4][1]), ODOMETRY.ros_type)
+    turn = raw.pose.pose.orientation
+    turn.z, turn.w = turn.z * scale, turn.w * scale
+    with pytest.raises(InvalidMessage, match="odometry orientation has norm .*, limits 0.99..1.01"):
+        decode(ODOMETRY, bytes(TYPES.serialize_cdr(raw, ODOMETRY.ros_type)))
