@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 from collections.abc import Callable, Iterator
 
@@ -18,7 +19,6 @@ from bridge.config.bridge import BridgeConfig
 from bridge.errors import TransportError
 from bridge.inbox import Inbox
 from bridge.messages import Wrench
-from bridge.outbox import Outbox
 from bridge.topics import WRENCH
 from bridge.transport.interface import Sample, Transport
 from bridge.transport.memory import MemoryHub
@@ -140,14 +140,22 @@ def test_a_killed_process_is_missed_and_its_successor_is_heard() -> None:
 def test_a_slow_reader_never_blocks_the_writer() -> None:
     config, clock = bridge_config(), SystemClock()
     writer, reader = ZenohTransport(config, "drive", clock), ZenohTransport(config, "controller", clock)
-    reader.subscribe(WRENCH, lambda _sample: time.sleep(0.5))
-    box = Outbox(writer, WRENCH)
+    arrived, longest_s = threading.Event(), 0.0
+
+    def dawdle(_sample: Sample) -> None:
+        arrived.set()
+        time.sleep(0.5)
+
+    reader.subscribe(WRENCH, dawdle)
+    publisher, payload = writer.publisher(WRENCH), bytes(16_384)
     try:
-        longest_s = 0.0
-        for _ in range(300):
+        assert until(lambda: publisher.put(payload, 0) or arrived.is_set())
+        for _ in range(1000):  # far more than the buffers of both ends hold
             before = time.monotonic()
-            box.send(Wrench(stamp_ns=clock.now_ns(), force=[0, 0, 0], torque=[0, 0, 0]))
+            publisher.put(payload, 0)
             longest_s = max(longest_s, time.monotonic() - before)
+            if longest_s > 0.4:
+                break
         # a reader stuck for half a second per sample would hold a blocking writer for that long
         assert longest_s < 0.4
     finally:
