@@ -156,3 +156,25 @@ def test_energy_delivered_never_exceeds_energy_taken_and_the_tank(seed: int, ini
         stored += 0.5 * hold[3] * (here[3] - CONFIG.height_hold_m) ** 2
         # The turn within a step leaves a remainder of second order in the spring's frame.
         assert stored <= supplied + initial_j + 0.02 * (1.0 + abs(supplied))
+
+
+def test_stiffening_at_a_displacement_is_paid_for_and_paid_back() -> None:
+    law = admittance()
+    law.stages(flat(0.3), pose(), np.zeros(4), np.zeros(4))  # the anchor is placed here
+    before_j, slack = law.tank.energy_j, law.stiffness.copy()
+    law.stages(flat(0.5), pose(x=0.05, y=-0.02), np.zeros(4), np.zeros(4))
+    price_j = 0.5 * float((law.stiffness - slack) @ np.array([0.05, -0.02, 0.0, 0.0]) ** 2)
+    assert price_j > 0.1
+    assert law.tank.energy_j == pytest.approx(before_j - price_j)
+    law.stages(flat(0.3), pose(x=0.05, y=-0.02), np.zeros(4), np.zeros(4))
+    assert law.tank.energy_j == pytest.approx(before_j)
+
+
+def test_the_tank_never_pays_more_than_it_holds() -> None:
+    law = admittance(AdmittanceConfig(tank_initial_j=0.2))
+    law.stages(flat(0.1), pose(), np.zeros(4), np.zeros(4))
+    for _ in range(20):
+        law.stages(flat(1.0), pose(x=0.1), np.zeros(4), np.zeros(4))
+    spent_j = 0.5 * float((law.stiffness[0] - 0.01 * CONFIG.stiffness_arrest[0]) * 0.1**2)
+    assert spent_j == pytest.approx(0.2)
+    assert law.tank.energy_j == pytest.approx(0.0, abs=1e-9)
