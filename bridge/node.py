@@ -14,17 +14,17 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from bridge.clock import Clock, SystemClock, nanoseconds
+from bridge.clock import Clock, SystemClock
 from bridge.config.load import load_config
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import ConfigError, SurefootError
+from bridge.loop import run_loop
 from bridge.messages import NodeStatus
 from bridge.outbox import Outbox
+from bridge.realtime import raise_priority
 from bridge.topics import DIAGNOSTICS
 from bridge.transport.interface import Transport
 from bridge.transport.zenoh import ZenohTransport
-
-STATUS_PERIOD_NS = nanoseconds(1.0 / DIAGNOSTICS.rate_hz)
 
 
 class NodeContext(NamedTuple):
@@ -69,6 +69,7 @@ class Node(Protocol):
 
 
 Factory = Callable[[NodeContext], Node]
+Priority = Callable[[SurefootConfig], int]  # SCHED_FIFO priority that the configuration asks for, 0 for none
 
 
 class _StopFlag:
@@ -83,7 +84,7 @@ class _StopFlag:
         self.set = True
 
 
-def main(role: str, factory: Factory, arguments: Sequence[str] | None = None) -> int:
+def main(role: str, factory: Factory, arguments: Sequence[str] | None = None, priority: Priority = lambda _: 0) -> int:
     """Run `role` until it is finished or told to stop; return the exit code (2: bad input, said in one line)."""
     parsed = _parse(role, arguments)
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format=f"%(asctime)s {role} %(levelname)s %(message)s")
@@ -96,7 +97,7 @@ def main(role: str, factory: Factory, arguments: Sequence[str] | None = None) ->
         transport = ZenohTransport(config.bridge, role, clock)
         try:
             context = NodeContext(config, transport, clock, logging.getLogger(role), options, path, tuple(parsed.set))
-            _serve(role, factory, context, stop, parsed.after)
+            _serve(role, factory, context, stop, parsed.after, priority(config))
         finally:
             transport.close()
     except SurefootError as error:
@@ -105,7 +106,9 @@ def main(role: str, factory: Factory, arguments: Sequence[str] | None = None) ->
     return 0
 
 
-def _serve(role: str, factory: Factory, context: NodeContext, stop: _StopFlag, after: Sequence[str]) -> None:
+def _serve(
+    role: str, factory: Factory, context: NodeContext, stop: _StopFlag, after: Sequence[str], priority: int
+) -> None:
     node = factory(context)
     try:
         await_roles(context.transport, after, context.config.launch.ready_timeout_s, lambda: stop.set)
@@ -113,7 +116,18 @@ def _serve(role: str, factory: Factory, context: NodeContext, stop: _StopFlag, a
         context.transport.declare_alive(role)
         gc.collect()
         gc.freeze()  # what start-up allocated is not walked again by every collection
-        _loop(node, diagnostics, context.clock, stop)
+        scheduling = raise_priority(priority)
+        if priority:
+            context.log.log(logging.INFO if scheduling.startswith("SCHED") else logging.WARNING, scheduling)
+        parent = os.getppid()
+        run_loop(
+            node,
+            diagnostics,
+            context.clock,
+            lambda: stop.set or os.getppid() != parent,  # the launcher was killed: do not run on unattended
+            context.log,
+            scheduling,
+        )
     finally:
         node.close()
 
@@ -138,27 +152,6 @@ def await_roles(transport: Transport, roles: Sequence[str], timeout_s: float, st
     finally:
         handle.close()
     return complete.is_set()
-
-
-def _loop(node: Node, diagnostics: Outbox, clock: Clock, stop: _StopFlag) -> None:
-    parent = os.getppid()
-    due_ns = clock.now_ns()
-    status_due_ns = due_ns
-    while not (stop.set or node.finished()):
-        now_ns = clock.now_ns()
-        node.step(now_ns)
-        if now_ns >= status_due_ns:
-            diagnostics.send(node.status(now_ns))
-            status_due_ns = now_ns + STATUS_PERIOD_NS
-            if os.getppid() != parent:  # the launcher was killed: do not run on unattended
-                return
-        if node.period_s is None:
-            node.wait()
-            continue
-        period_ns = nanoseconds(node.period_s)
-        # a late turn is not made up for by a burst of early ones
-        due_ns = max(due_ns + period_ns, clock.now_ns())
-        clock.sleep_until(due_ns)
 
 
 def _parse(role: str, arguments: Sequence[str] | None) -> argparse.Namespace:

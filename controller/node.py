@@ -15,7 +15,7 @@ from bridge.inbox import Inbox
 from bridge.messages import FallHorizon, GaitState, NodeStatus, Odometry, SupportCommand, Wrench
 from bridge.node import Node, NodeContext, main
 from bridge.outbox import Outbox
-from bridge.timing import LoopTiming
+from bridge.timing import LoopTiming, Spread
 from bridge.topics import FALL_HORIZON, ODOMETRY, SUPPORT_COMMAND, TWIST, WRENCH
 from controller.gate import GateLimits, SafetyGate
 from controller.interface import Controller, Decision
@@ -55,6 +55,7 @@ class ControllerNode:
         self._refused_config = ""
         self._failure = ""  # why the controller's last answer was not used
         self._timing = LoopTiming(self._period_s)
+        self._solve_s = Spread()  # how long the controller took for its answer
         self._running = False  # the controller answered in the period before
         self._overruns = 0
         self._sent: SupportCommand | None = None
@@ -86,8 +87,15 @@ class ControllerNode:
         return False
 
     def close(self) -> None:
-        """Stop watching the configuration and close the log."""
+        """Stop watching the configuration, close the log and say how it went."""
         self._watcher.close()
+        errors, solves = self._timing.error_s.percentiles(), self._solve_s.percentiles()
+        self._context.log.info(
+            "period error p50 %.3f, p99 %.3f, at most %.3f ms; %d answers took p50 %.3f, p99 %.3f, at most %.3f ms; "
+            "%d overruns; %d commands refused by the gate",
+            *(1e3 * value for value in errors), self._solve_s.count, *(1e3 * value for value in solves),
+            self._overruns, self._gate.refused,
+        )  # fmt: skip
         if self._mock is not None:
             self._mock.close()
 
@@ -100,8 +108,8 @@ class ControllerNode:
         level = ERROR if self._failure else WARNING if trouble or state in _STOPPED else OK
         values = {
             "rate_hz": f"{self._timing.rate_hz():.1f}",
-            "period_p99_ms": f"{self._timing.period_p99_s() * 1e3:.2f}",
-            "missed_periods": str(self._timing.missed),
+            **self._timing.error_s.report("period_error"),
+            **self._solve_s.report("solve"),
             "overruns": str(self._overruns),
             **{f"age_ms.{name}": f"{age_s * 1e3:.0f}" for name, age_s in self._ages_s.items()},
             "state": state.value,
@@ -138,6 +146,7 @@ class ControllerNode:
             command = self._controller.step(now_ns, odometry, wrench, decision)
             # by the node's clock, not the solver's: in simulated time nothing depends on how long the machine took
             command = replace(command, solve_time_s=(self._context.clock.now_ns() - started_ns) / NS)
+            self._solve_s.note(command.solve_time_s)
         except Exception as error:  # noqa: BLE001 (whatever it is, the loop must go on and the base must brake)
             failure = f"controller failed: {type(error).__name__}: {error}"
         took_s = (self._context.clock.now_ns() - now_ns) / NS
@@ -222,4 +231,4 @@ def create(context: NodeContext) -> Node:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main("controller", create))
+    raise SystemExit(main("controller", create, priority=lambda config: config.controller.realtime_priority))

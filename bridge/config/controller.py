@@ -21,6 +21,10 @@ class ControllerConfig(Section):
     overrun_s: float = Field(default=0.04, gt=0, le=0.05)
     """A command that took longer to compute than this is replaced by the safe command [s]; the drive waits 60 ms."""
 
+    realtime_priority: int = Field(default=0, ge=0, le=80)
+    """Priority of the control loop under SCHED_FIFO (Linux; 20 is usual); 0 = ordinary. Where the system does not
+    permit it the loop runs as an ordinary one and says so."""
+
     log: str = ""
     """File of the logging mock (JSON lines); "" = keep the records in memory only."""
 

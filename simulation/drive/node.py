@@ -85,7 +85,7 @@ class DriveNode:
         reason = "not started" if executed is None else executed.reason
         values = {
             "rate_hz": f"{self._timing.rate_hz():.1f}",
-            "period_p99_ms": f"{self._timing.period_p99_s() * 1e3:.2f}",
+            **self._timing.error_s.report("period_error"),
             "age_ms.command": f"{self._age_s * 1e3:.0f}",
             "x_m": f"{self._state.x:.2f}",
             "y_m": f"{self._state.y:.2f}",

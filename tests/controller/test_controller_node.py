@@ -242,7 +242,8 @@ class TestStatus:
         status = bench.node.status(bench.clock.now_ns())
         assert status.level == 0
         assert float(status.values["rate_hz"]) == pytest.approx(100.0)
-        assert float(status.values["period_p99_ms"]) == pytest.approx(10.0)
+        assert float(status.values["period_error_ms.p99"]) == pytest.approx(0.0)
+        assert float(status.values["solve_ms.p50"]) == pytest.approx(1.0)
         assert float(status.values["age_ms.horizon"]) <= 30
         assert float(status.values["age_ms.wrench"]) == 0
         assert float(status.values["age_ms.odometry"]) == 0
