@@ -38,8 +38,11 @@ COMMANDS: Final = {
     "record": Command("bridge.record.record_command:record", "Record what is on the wire into an MCAP file."),
     "info": Command("bridge.record.info_command:info", "Say what is in a recording, also one that was cut off."),
     "replay": Command("bridge.record.replay_command:replay", "Replay a recording to everyone or to one process."),
+    "view": Command("bridge.view.command:view", "Look at what runs, or at a recording, in Rerun."),
     "train": Command("anticipation.training.commands:train", "Train the anticipation networks."),
-    "evaluate": Command("anticipation.training.commands:evaluate", "Measure the anticipation, split by sequence."),
+    "evaluate": Command(
+        "anticipation.training.evaluation.command:evaluate", "Measure the anticipation, split by sequence."
+    ),
 }
 
 _usage_error = typer.BadParameter.__base__  # typer names only this one of its usage errors

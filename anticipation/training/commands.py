@@ -1,8 +1,7 @@
-"""`surefoot train` and `surefoot evaluate`."""
+"""`surefoot train`."""
 
 from __future__ import annotations
 
-import json
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -12,7 +11,7 @@ import typer
 from rich.console import Console
 
 from anticipation import checkpoint
-from anticipation.training import evaluation, production, report
+from anticipation.training import production
 from anticipation.training.clips import data_folder
 from anticipation.training.corpus import read_corpus
 from anticipation.training.networks import progress_bars
@@ -26,21 +25,6 @@ class Forecaster(StrEnum):
 
     LSTM = "lstm"
     DCT_MLP = "dct_mlp"
-
-
-class Protocol(StrEnum):
-    """How recordings are divided into training and test."""
-
-    GROUPED = "grouped"
-    PAPER = "paper"
-
-
-class Keypoints(StrEnum):
-    """Whose tracks of the URFD falls are tested."""
-
-    ALPHAPOSE = "alphapose"
-    MOVENET = "movenet"
-    BOTH = "both"
 
 
 Data = Annotated[
@@ -76,44 +60,6 @@ def train(
         made = production.make_checkpoint(corpus, plan, folds, seed, measured, progress)
     checkpoint.save(made, out)
     Console().print(f"wrote {out} ({out.stat().st_size / 1e6:.1f} MB)")
-
-
-def evaluate(
-    data: Data = None,
-    protocol: Annotated[Protocol, typer.Option(help="'grouped' by recording, or the 'paper''s.")] = Protocol.GROUPED,
-    folds: Folds = 5,
-    seed: Seed = 0,
-    forecaster: Annotated[Forecaster, typer.Option(help="Network that foresees the motion.")] = Forecaster.DCT_MLP,
-    keypoints: Annotated[Keypoints, typer.Option(help="Tracks of the falls to test on.")] = Keypoints.ALPHAPOSE,
-    epochs: Epochs = None,
-    json_file: Annotated[Path | None, typer.Option("--json", help="Write every number to this file.")] = None,
-    quick: Quick = False,
-) -> None:
-    """Print how well recordings are foreseen that no network has seen, beside simpler ways."""
-    folder = data_folder(data)
-    if json_file is not None:
-        _writable(json_file)
-    plan = plan_for(forecaster.value, seed, quick, epochs)
-    _one_thread()
-    corpus = read_corpus(folder, plan.mocap_clips, seed, CleaningConfig())
-    with progress_bars() as progress:
-        if protocol is Protocol.GROUPED:
-            title = f"{folds} folds by recording, seed {seed}, URFD falls ({keypoints.value})"
-            outcome = evaluation.grouped(corpus, plan, folds, seed, keypoints.value, progress)
-        else:
-            title = (
-                f"random 80/20 of overlapping windows, seed {seed}, URFD falls ({keypoints.value}): not by recording"
-            )
-            outcome = evaluation.paper(corpus, plan, seed, keypoints.value, progress)
-    report.show(outcome, title, _console())
-    if json_file is not None:
-        json_file.write_text(json.dumps(report.as_json(outcome, title, seed), indent=1) + "\n")
-
-
-def _console() -> Console:
-    """A terminal as it is; a file or a pipe wide enough for the tables."""
-    console = Console()
-    return console if console.is_terminal else Console(width=140)
 
 
 def _one_thread() -> None:

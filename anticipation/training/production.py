@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import torch
+from numpy.typing import NDArray
 from rich.progress import Progress
 from torch import nn
 
 from anticipation.checkpoint import Checkpoint, Provenance
-from anticipation.gait_state import DirectedGraphNetwork
-from anticipation.motion import WINDOW
+from anticipation.mirror import mirrored
+from anticipation.motion import COORDINATES, WINDOW
 from anticipation.quality import PoseStatistics
 from anticipation.training.corpus import Corpus, Shares, people_folds, shares, tested
-from anticipation.training.evaluation import predict
+from anticipation.training.fitting import apply
 from anticipation.training.measures import temperatures
 from anticipation.training.networks import fitted_classifier, pretrained_forecaster, tuned_forecaster
 from anticipation.training.plan import Plan
-from anticipation.training.samples import cut
+from anticipation.training.samples import Samples, Track, cut
 from anticipation.transient import TransientPlane, fold
 from bridge.errors import SourceError
 from bridge.messages import STEPS, Floats
@@ -48,21 +51,48 @@ def make_checkpoint(
     pretrained = pretrained_forecaster(plan, everything, progress)
     if evaluation is None:
         training, test = people_folds(corpus, folds, seed)[0]
-        known = shares(corpus, [corpus.people[index] for index in training])
-        forecaster, classifier = _fit(pretrained, plan, known, "calibration", progress)
+        chosen = [corpus.people[index] for index in training]
+        first = fold_checkpoint(corpus, chosen, shares(corpus, chosen), pretrained, plan, seed, "calibration", progress)
         held_out = cut(tested(corpus, test, "both"))
-        temperature = temperatures(predict(classifier, forecaster, held_out), held_out.labels)
+        temperature = temperatures(_logits(first, held_out), held_out.labels)
     else:
         temperature = np.array(evaluation["temperature"], dtype=np.float64)
-    forecaster, classifier = _fit(pretrained, plan, everything, "all recordings", progress)
+    made = fold_checkpoint(corpus, corpus.people, everything, pretrained, plan, seed, "all recordings", progress)
     protocol = "not evaluated" if evaluation is None else str(evaluation["protocol"])
+    provenance = Provenance(DATA, LICENCE, protocol, {} if evaluation is None else dict(evaluation))
+    return replace(made, temperature=temperature, provenance=provenance)
+
+
+def fold_checkpoint(
+    corpus: Corpus,
+    chosen: Sequence[Track],
+    known: Shares,
+    pretrained: nn.Module,
+    plan: Plan,
+    seed: int,
+    name: str,
+    progress: Progress,
+) -> Checkpoint:
+    """Fit everything a checkpoint holds to the people in `chosen` and to the mocap walks alone; temperatures are 1.
+
+    Args:
+        corpus: where `chosen` and the walks come from.
+        chosen: tracks of the people that may be learnt from.
+        known: their samples, weighed.
+        pretrained: forecaster that knows the walks; it is not changed.
+        plan: how much is learnt.
+        seed: of whatever is drawn.
+        name: what the progress bars call it.
+        progress: where they are shown.
+    """
+    forecaster = tuned_forecaster(pretrained, plan, known, name, progress)
     return Checkpoint(
         forecaster=forecaster,
-        classifier=classifier,
-        plane=_plane(corpus, seed),
-        statistics=_statistics(everything, seed),
-        temperature=temperature,
-        provenance=Provenance(DATA, LICENCE, protocol, {} if evaluation is None else dict(evaluation)),
+        classifier=fitted_classifier(plan, known, forecaster, name, progress),
+        plane=_plane(corpus, chosen, seed),
+        statistics=_statistics(known, seed),
+        temperature=np.ones(STEPS),
+        provenance=Provenance(DATA, LICENCE, f"{name}: for evaluation only"),
     )
 
 
@@ -81,14 +111,19 @@ def read_evaluation(path: Path) -> dict[str, Any]:
     return report
 
 
-def _fit(
-    pretrained: nn.Module, plan: Plan, known: Shares, name: str, progress: Progress
-) -> tuple[nn.Module, DirectedGraphNetwork]:
-    forecaster = tuned_forecaster(pretrained, plan, known, name, progress)
-    return forecaster, fitted_classifier(plan, known, forecaster, name, progress)
+def _logits(checkpoint: Checkpoint, samples: Samples) -> NDArray[np.float32]:
+    """Return logits (M, 16, 3) of the present and the 15 foreseen steps, averaged with the mirror image's."""
+
+    def run(window: torch.Tensor) -> torch.Tensor:
+        sides = (window, mirrored(window))
+        one, other = (checkpoint.classifier(torch.cat((side, checkpoint.forecast(side)), dim=1)) for side in sides)
+        logits: torch.Tensor = 0.5 * (one + other)
+        return logits
+
+    return apply(run, samples.poses[:, :WINDOW])
 
 
-def _plane(corpus: Corpus, seed: int) -> TransientPlane:
+def _plane(corpus: Corpus, chosen: Sequence[Track], seed: int) -> TransientPlane:
     """Fit the plane to windows of the URFD falls, with some of daily life and of walks to keep the boundary off them.
 
     Its features are the windows themselves, folded and with their mirror images, so that left and right count alike:
@@ -96,15 +131,19 @@ def _plane(corpus: Corpus, seed: int) -> TransientPlane:
     which it does not on the classifier's pooled features.
     """
     rng = np.random.default_rng(seed)
+    names = {track.name for track in chosen}
     features, labels = [], []
-    for tracks, most in ((corpus.falls, None), (corpus.daily, PLANE_DAILY), (corpus.walks, PLANE_WALKS)):
+    falls, staged, daily = (
+        [track for track in tracks if track.name in names] for tracks in (corpus.falls, corpus.staged, corpus.daily)
+    )
+    for tracks, most in ((falls or staged, None), (daily, PLANE_DAILY), (corpus.walks, PLANE_WALKS)):
         samples = cut(tracks)
         rows = np.flatnonzero(samples.labels[:, 0] >= 0)
         if most is not None and most < len(rows):
             rows = np.sort(rng.choice(rows, most, replace=False))
         folded = fold(samples.poses[rows, :WINDOW])
         for side in (folded, folded[..., MIRROR, :]):
-            features.append(side.reshape(len(rows), -1))
+            features.append(side.reshape(len(rows), WINDOW * COORDINATES))
             labels.append(samples.labels[rows, 0])
     return TransientPlane.fit(np.concatenate(features), np.concatenate(labels), "folded")
 
