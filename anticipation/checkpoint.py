@@ -97,7 +97,7 @@ def save(checkpoint: Checkpoint, path: Path, storage: Literal["float16", "float3
         header[part] = _describe(network)
         if isinstance(network, nn.Module):
             tensors |= {f"{part}/{name}": _stored(value, storage) for name, value in network.state_dict().items()}
-    _write(path, to_bytes(tensors, metadata={_HEADER: json.dumps(header)}))
+    write_whole(path, to_bytes(tensors, metadata={_HEADER: json.dumps(header)}))
 
 
 def load(path: Path | None = None) -> Checkpoint:
@@ -197,7 +197,7 @@ def _one_line(error: Exception) -> str:
     return " ".join(lines[:2])
 
 
-def _write(path: Path, content: bytes) -> None:
+def write_whole(path: Path, content: bytes) -> None:
     """Write to a temporary file beside `path`, flush it to the disk and rename it."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")

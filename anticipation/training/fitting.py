@@ -1,4 +1,4 @@
-"""Fit the forecaster and the classifier: Adam, step decay, fixed seeds, one thread.
+"""Fit the forecaster and the classifier: what each learns from a batch. How the learning goes on is in `descent`.
 
 Every epoch draws samples with replacement, each source with its share, so that 1,800 windows of
 falls are not drowned by 60,000 of walking.
@@ -6,45 +6,26 @@ falls are not drowned by 60,000 of walking.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
-from torch.optim.swa_utils import AveragedModel
 
 from anticipation.gait_state import DirectedGraphNetwork
 from anticipation.motion import HORIZON, WINDOW, Forecast
-from anticipation.training.augmentation import augment
 from anticipation.training.clips import UNLABELLED
+from anticipation.training.descent import Batch, Fit, Progress, Recipe, SharesOfBatch, descend
 from anticipation.training.measures import STEPS
-from anticipation.training.samples import Samples
+from anticipation.training.run import ALONE, Run
 from anticipation.training.shifted import ShiftedNetwork
+from anticipation.training.team import Team
 
-DECAY_EVERY: Final = 16  # epochs (paper, III.B)
-DECAY: Final = 0.3
+__all__ = ["Progress", "Recipe", "apply", "fit_classifier", "fit_forecaster", "fit_shifted"]
+
 SMOOTH_L1_AT: Final = 0.05  # where the loss turns from square to absolute [body lengths]
-AVERAGED: Final = 0.4  # the last share of the epochs whose weights are averaged
-GRAPH_FROZEN: Final = 4  # epochs before the incidence may learn (Shi et al. 2019 freeze it at first)
-
-
-@dataclass(frozen=True, slots=True)
-class Recipe:
-    """How long and from what a network learns."""
-
-    epochs: int
-    draws: int  # samples an epoch
-    batch: int = 128
-    rate: float = 1e-3  # Adam's learning rate at the start (paper, III.B)
-    seed: int = 0
-    augmented: bool = True
-
-
-Progress = Callable[[float], None]
-"""Called after each epoch with its mean loss."""
 
 
 def silent(loss: float) -> None:
@@ -52,51 +33,28 @@ def silent(loss: float) -> None:
     del loss
 
 
-def draw_batches(
-    shares: Sequence[tuple[Samples, float]], recipe: Recipe, generator: torch.Generator
-) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
-    """Yield one epoch of (poses (B, 30, 12, 2), known (B, 30), labels (B, 16)).
-
-    Each source fills its share of every batch, so that batch norm sees the same mixture throughout.
-    """
-    total = sum(share for _, share in shares)
-    for _ in range(max(1, recipe.draws // recipe.batch)):
-        poses, known, labels = [], [], []
-        for samples, share in shares:
-            count = max(1, round(recipe.batch * share / total))
-            index = torch.randint(len(samples), (count,), generator=generator).numpy()
-            poses.append(samples.poses[index])
-            known.append(samples.known[index])
-            labels.append(samples.labels[index])
-        yield (
-            torch.from_numpy(np.concatenate(poses)),
-            torch.from_numpy(np.concatenate(known)),
-            torch.from_numpy(np.concatenate(labels)),
-        )
-
-
 def fit_forecaster(
-    network: nn.Module, shares: Sequence[tuple[Samples, float]], recipe: Recipe, progress: Progress = silent
+    network: nn.Module, shares: SharesOfBatch, recipe: Recipe, progress: Progress = silent, run: Run = ALONE
 ) -> None:
     """Fit a forecaster to the futures that are known, with smooth L1."""
 
-    def loss(poses: Tensor, known: Tensor, labels: Tensor) -> Tensor:
-        del labels
+    def loss(model: nn.Module, batch: Batch) -> Tensor:
         error = nn.functional.smooth_l1_loss(
-            network(poses[:, :WINDOW]), poses[:, WINDOW:], beta=SMOOTH_L1_AT, reduction="none"
+            model(batch.poses[:, :WINDOW]), batch.poses[:, WINDOW:], beta=SMOOTH_L1_AT, reduction="none"
         )
-        there = known[:, WINDOW:, None, None].expand_as(error)
-        return error[there].mean()
+        there = batch.known[:, WINDOW:, None, None].expand_as(error)
+        return run.team.mean(error, there)
 
-    _descend(network, loss, shares, recipe, progress)
+    descend(Fit(network, loss), shares, recipe, progress, run)
 
 
 def fit_classifier(
     network: DirectedGraphNetwork,
-    shares: Sequence[tuple[Samples, float]],
+    shares: SharesOfBatch,
     recipe: Recipe,
     forecast: Forecast | None = None,
     progress: Progress = silent,
+    run: Run = ALONE,
 ) -> None:
     """Fit a classifier with cross-entropy, one window of each sample at a time.
 
@@ -105,77 +63,40 @@ def fit_classifier(
     end at the present. Without, all do.
     """
 
-    def loss(poses: Tensor, known: Tensor, labels: Tensor) -> Tensor:
-        del known
-        seen = poses[:, :WINDOW]
+    def loss(model: nn.Module, batch: Batch) -> Tensor:
+        seen = batch.poses[:, :WINDOW]
         if forecast is None:
-            return cross_entropy(network(seen), labels[:, :1])
+            return cross_entropy(model(seen), batch.labels[:, :1], run.team)
         with torch.no_grad():
             frames = torch.cat((seen, forecast(seen)), dim=1)
-        ends = torch.randint(-(HORIZON // 3), HORIZON + 1, (len(frames),), generator=steps).clamp(min=0)
-        rows = torch.arange(len(frames))[:, None]
-        windows = frames[rows, ends[:, None] + torch.arange(WINDOW)]
-        return cross_entropy(network(windows), labels.gather(1, ends[:, None]))
+        ends = torch.randint(-(HORIZON // 3), HORIZON + 1, (batch.whole,), generator=steps).clamp(min=0)
+        ends = run.team.own(ends).to(batch.device)
+        rows = torch.arange(len(frames), device=batch.device)[:, None]
+        windows = frames[rows, ends[:, None] + torch.arange(WINDOW, device=batch.device)]
+        return cross_entropy(model(windows), batch.labels.gather(1, ends[:, None]), run.team)
 
     steps = torch.Generator().manual_seed(recipe.seed)
     network.set_graph_trainable(False)
-    _descend(network, loss, shares, recipe, progress, network.set_graph_trainable)
+    others = [forecast] if isinstance(forecast, nn.Module) else []
+    descend(Fit(network, loss, [steps], network.set_graph_trainable, others), shares, recipe, progress, run)
 
 
 def fit_shifted(
-    network: ShiftedNetwork, shares: Sequence[tuple[Samples, float]], recipe: Recipe, progress: Progress = silent
+    network: ShiftedNetwork, shares: SharesOfBatch, recipe: Recipe, progress: Progress = silent, run: Run = ALONE
 ) -> None:
     """Fit DGNN-only: the window seen, the labels of the present and of each shift."""
 
-    def loss(poses: Tensor, known: Tensor, labels: Tensor) -> Tensor:
-        del known
-        return cross_entropy(network(poses[:, :WINDOW]), labels[:, list(STEPS)])
+    def loss(model: nn.Module, batch: Batch) -> Tensor:
+        return cross_entropy(model(batch.poses[:, :WINDOW]), batch.labels[:, list(STEPS)], run.team)
 
     network.set_graph_trainable(False)
-    _descend(network, loss, shares, recipe, progress, network.set_graph_trainable)
+    descend(Fit(network, loss, thaw=network.set_graph_trainable), shares, recipe, progress, run)
 
 
-def cross_entropy(logits: Tensor, labels: Tensor) -> Tensor:
+def cross_entropy(logits: Tensor, labels: Tensor, team: Team) -> Tensor:
     """Mean cross-entropy of logits (B, T, 3) over the labels (B, T) that are known."""
-    return nn.functional.cross_entropy(logits.flatten(0, 1), labels.flatten(), ignore_index=UNLABELLED)
-
-
-def _descend(
-    network: nn.Module,
-    loss_of: Callable[[Tensor, Tensor, Tensor], Tensor],
-    shares: Sequence[tuple[Samples, float]],
-    recipe: Recipe,
-    progress: Progress,
-    thaw: Callable[[bool], None] | None = None,
-) -> None:
-    """Run Adam with step decay; leave the mean of the last epochs' weights in the network, in evaluation mode.
-
-    The mean lies where the loss is flat (Izmailov et al., "Averaging Weights Leads to Wider Optima and Better
-    Generalization", UAI 2018): with 20 falls to learn from, one epoch's weights are a draw.
-    """
-    generator = torch.Generator().manual_seed(recipe.seed)
-    torch.manual_seed(recipe.seed)  # dropout draws from the global generator
-    optimizer = torch.optim.Adam(network.parameters(), lr=recipe.rate)
-    schedule = torch.optim.lr_scheduler.StepLR(optimizer, DECAY_EVERY, DECAY)
-    network.train()
-    averaged = AveragedModel(network, use_buffers=True)
-    for epoch in range(recipe.epochs):
-        if thaw is not None and epoch == GRAPH_FROZEN:
-            thaw(True)
-        losses = []
-        for poses, known, labels in draw_batches(shares, recipe, generator):
-            loss = loss_of(augment(poses, generator) if recipe.augmented else poses, known, labels)
-            optimizer.zero_grad(set_to_none=True)
-            torch.autograd.backward(loss)
-            nn.utils.clip_grad_norm_(network.parameters(), 5.0)
-            optimizer.step()
-            losses.append(loss.item())
-        schedule.step()
-        if epoch >= (1.0 - AVERAGED) * recipe.epochs:
-            averaged.update_parameters(network)
-        progress(float(np.mean(losses)))
-    network.load_state_dict(averaged.module.state_dict())
-    network.eval()
+    each = nn.functional.cross_entropy(logits.mT, labels, ignore_index=UNLABELLED, reduction="none")
+    return team.mean(each, labels != UNLABELLED)
 
 
 @torch.no_grad()
