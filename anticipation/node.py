@@ -74,6 +74,8 @@ class AnticipationNode:
             level, summary = 0, "foreseeing"
         elif newest is not None:
             level, summary = (2 if self._complained_ns is not None else 1), newest.reason
+        if rival := self._inbox.rival(now_ns):
+            level, summary = max(level, 1), f"{summary} ({rival})"
         age_ms = "" if self._stamp_ns is None else f"{(now_ns - self._stamp_ns) / 1e6:.0f}"
         values = {
             "rate_hz": f"{self._rate.rate_hz(now_ns):.1f}",
@@ -128,7 +130,8 @@ def create(context: NodeContext) -> AnticipationNode:
     torch.set_num_threads(config.threads)
     predictor = Predictor.from_config(config)
     predictor.warm_up()
-    inbox = Inbox[Keypoints](context.transport, KEYPOINTS, depth=WINDOW)
+    stuck_after_s = context.config.inputs.stuck_after_s
+    inbox = Inbox[Keypoints](context.transport, KEYPOINTS, depth=WINDOW, stuck_after_s=stuck_after_s)
     return AnticipationNode(predictor, inbox, Outbox(context.transport, FALL_HORIZON), context.clock, context.log)
 
 

@@ -10,12 +10,14 @@ from bridge.clock import NS
 from bridge.codec import decode
 from bridge.errors import InvalidMessage
 from bridge.messages import Message
+from bridge.stuck import StuckWatch
 from bridge.topics import Topic
 from bridge.transport.interface import Sample, Transport
 
 M = TypeVar("M", bound=Message)
 
 FUTURE_TOLERANCE_S = 0.050  # clocks of two machines under NTP differ by less
+_RIVAL_SAID_S = 1.0  # a second publisher is a warning for this long after it was last heard
 
 
 class Reading(NamedTuple, Generic[M]):
@@ -38,24 +40,46 @@ class Inbox(Generic[M]):
     The transport's callback only stores bytes. Decoding and every check run in the
     reader's own loop: order by sequence number within one publisher, shape,
     finiteness and range by the message's `check`, age by the reader's clock.
+
+    A stream has one publisher at a time. While the one that is followed lives, what another says is refused
+    and its being there is said (`rival`); it takes over when the first has been silent for `max_age_s`.
+
+    Args:
+        transport: where to listen.
+        topic: what to listen to.
+        max_age_s: older is a fault [s]; None: what the topic table says.
+        depth: how many samples to keep for `drain`.
+        stuck_after_s: values that stay the same for longer under new stamps are a fault [s]; 0 = never.
     """
 
-    def __init__(self, transport: Transport, topic: Topic, max_age_s: float | None = None, depth: int = 1) -> None:
+    def __init__(
+        self,
+        transport: Transport,
+        topic: Topic,
+        max_age_s: float | None = None,
+        depth: int = 1,
+        stuck_after_s: float = 0.0,
+    ) -> None:
         self.topic = topic
         self.max_age_s = topic.max_age_s if max_age_s is None else max_age_s
+        self._stuck = StuckWatch(topic.key, stuck_after_s)
+        # apart, so that nobody can crowd out the publisher that is followed
         self._waiting: deque[Sample] = deque(maxlen=depth)
+        self._waiting_others: deque[Sample] = deque(maxlen=depth)
         self._arrived = threading.Event()
         self._message: M | None = None
         self._source: bytes = b""
         self._sequence = -1
         self._stamp_ns = 0
+        self._heard_ns = 0  # when the publisher that is followed was last heard, by the reader's clock
+        self._rival_ns: int | None = None  # when another was
         self._fault = ""
         self.accepted = 0
         self.refused = 0
         self._handle = transport.subscribe(topic, self._store)
 
     def _store(self, sample: Sample) -> None:
-        self._waiting.append(sample)
+        (self._waiting if sample.source == self._source else self._waiting_others).append(sample)
         self._arrived.set()
 
     def wait(self, timeout_s: float) -> bool:
@@ -76,6 +100,12 @@ class Inbox(Generic[M]):
         """
         return list(self._take(now_ns))
 
+    def rival(self, now_ns: int) -> str:
+        """Return a warning while somebody else publishes this topic too, else ''."""
+        if self._rival_ns is None or now_ns - self._rival_ns > _RIVAL_SAID_S * NS:
+            return ""
+        return f"two publishers of {self.topic.key}: the first is followed, the other refused"
+
     def close(self) -> None:
         """Stop listening."""
         self._handle.close()
@@ -92,8 +122,11 @@ class Inbox(Generic[M]):
     def _take(self, now_ns: int) -> list[M]:
         self._arrived.clear()
         taken: list[M] = []
-        while self._waiting:
-            sample = self._waiting.popleft()
+        while sample := self._next():
+            if self._is_rivals(sample):
+                self._rival_ns = sample.arrival_ns
+                self.refused += 1
+                continue
             try:
                 message = self._judge(sample, now_ns)
             except _OldSample:
@@ -106,6 +139,10 @@ class Inbox(Generic[M]):
             taken.append(message)
         return taken
 
+    def _next(self) -> Sample | None:
+        waiting = self._waiting or self._waiting_others
+        return waiting.popleft() if waiting else None
+
     def _judge(self, sample: Sample, now_ns: int) -> M:
         message: Any = decode(self.topic, sample.payload, max(sample.sequence, 0))
         # a sample may arrive between the reader's `now` and this line, however late the reader got here
@@ -115,17 +152,25 @@ class Inbox(Generic[M]):
             raise InvalidMessage(f"{self.topic.key} is stamped {ahead_s * 1e3:.0f} ms ahead, limit {limit_ms:.0f}")
         if self._is_old(sample, message):
             raise _OldSample
-        self._source, self._sequence, self._stamp_ns = sample.source, sample.sequence, message.stamp_ns
         try:
             message.check()
+            self._stuck.judge(message)
         except InvalidMessage as error:
+            declared = not getattr(message, "valid", True)
+            if declared or sample.source == self._source:  # who sends nonsense is not one to follow from now on
+                self._follow(sample, message)
             self._fault = str(error)
-            if getattr(message, "valid", True):
-                raise
-            return message  # type: ignore[no-any-return]
+            if declared:
+                return message  # type: ignore[no-any-return]
+            raise
+        self._follow(sample, message)
         self._message, self._fault = message, ""
         self.accepted += 1
         return message  # type: ignore[no-any-return]
+
+    def _follow(self, sample: Sample, message: Message) -> None:
+        self._source, self._sequence, self._stamp_ns = sample.source, sample.sequence, message.stamp_ns
+        self._heard_ns = sample.arrival_ns
 
     def _is_old(self, sample: Sample, message: Message) -> bool:
         """Whether something newer was taken already: by number within a publisher, by stamp across publishers.
@@ -137,6 +182,12 @@ class Inbox(Generic[M]):
         if self.topic.publisher == "*":
             return False
         return message.stamp_ns <= self._stamp_ns
+
+    def _is_rivals(self, sample: Sample) -> bool:
+        """Whether another publisher sent it while the one that is followed lives; then it is not even read."""
+        if sample.source == self._source or not self._source or self.topic.publisher == "*":
+            return False
+        return sample.arrival_ns - self._heard_ns <= self.max_age_s * NS
 
 
 class _OldSample(Exception):  # noqa: N818 (not an error: replaced by something newer)

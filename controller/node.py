@@ -44,10 +44,10 @@ class ControllerNode:
             column_height_m=config.admittance.height_hold_m,
             ordered=False,  # the outbox numbers commands after the gate
         )
-        limits = config.supervisor
-        self._horizon: Inbox[FallHorizon] = Inbox(context.transport, FALL_HORIZON, limits.horizon_age_limit_s)
-        self._wrench: Inbox[Wrench] = Inbox(context.transport, WRENCH, limits.wrench_age_limit_s)
-        self._odometry: Inbox[Odometry] = Inbox(context.transport, ODOMETRY, limits.odometry_age_limit_s)
+        limits, stuck_s, wire = config.supervisor, config.inputs.stuck_after_s, context.transport
+        self._horizon = Inbox[FallHorizon](wire, FALL_HORIZON, limits.horizon_age_limit_s, stuck_after_s=stuck_s)
+        self._wrench = Inbox[Wrench](wire, WRENCH, limits.wrench_age_limit_s, stuck_after_s=stuck_s)
+        self._odometry = Inbox[Odometry](wire, ODOMETRY, limits.odometry_age_limit_s, stuck_after_s=stuck_s)
         self._ages_s = dict.fromkeys(("horizon", "wrench", "odometry"), math.inf)
         self._command = Outbox(context.transport, SUPPORT_COMMAND)
         self._twist = Outbox(context.transport, TWIST)
@@ -104,7 +104,8 @@ class ControllerNode:
         sent = self._sent
         state = GaitState.DISARMED if sent is None else sent.state
         reason = "not started" if sent is None else sent.reason
-        trouble = self._refused_config or (self._mock.fault if self._mock is not None else "")
+        rivals = "; ".join(filter(None, (box.rival(now_ns) for box in (self._horizon, self._wrench, self._odometry))))
+        trouble = self._refused_config or (self._mock.fault if self._mock is not None else "") or rivals
         level = ERROR if self._failure else WARNING if trouble or state in _STOPPED else OK
         values = {
             "rate_hz": f"{self._timing.rate_hz():.1f}",

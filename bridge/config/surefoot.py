@@ -8,6 +8,7 @@ from bridge.config.bridge import BridgeConfig
 from bridge.config.controller import ControllerConfig
 from bridge.config.drive import DriveConfig
 from bridge.config.gate import GateConfig
+from bridge.config.inputs import InputsConfig
 from bridge.config.intervention import InterventionConfig
 from bridge.config.launch import LaunchConfig
 from bridge.config.mpc import MpcConfig
@@ -22,6 +23,9 @@ class SurefootConfig(Section):
 
     bridge: BridgeConfig = BridgeConfig()
     """The wire."""
+
+    inputs: InputsConfig = InputsConfig()
+    """What readers hold their inputs to."""
 
     launch: LaunchConfig = LaunchConfig()
     """The processes."""

@@ -93,8 +93,10 @@ class DriveNode:
             "column_m": f"{self._state.height:.3f}",
             "gate_refused": str(self._gate.refused),
         }
-        summary = "follows commands" if moving else f"holds: {reason}"
-        return NodeStatus(stamp_ns=now_ns, role="drive", level=0 if moving else 1, summary=summary, values=values)
+        rival = self._commands.rival(now_ns)
+        summary = ("follows commands" if moving else f"holds: {reason}") + (f" ({rival})" if rival else "")
+        level = 0 if moving and not rival else 1
+        return NodeStatus(stamp_ns=now_ns, role="drive", level=level, summary=summary, values=values)
 
 
 def _odometry(state: DriveState, now_ns: int) -> Odometry:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from math import pi, sin
+from typing import Final
 
 import numpy as np
 
 from bridge.config.drive import DriveConfig
 from bridge.messages import Floats
+
+_SWING_RAD_S: Final = 4.4  # a pendulum of half a metre, the straps of a harness
 
 
 def scripted_force(config: DriveConfig, time_s: float) -> Floats:
@@ -23,7 +26,8 @@ def scripted_force(config: DriveConfig, time_s: float) -> Floats:
     if config.script == "fall":
         part = _hanging(config, since_s)
         forward, left, up = _walking(config, time_s)
-        return np.array([(1.0 - part) * forward, (1.0 - part) * left, (1.0 - part) * up - part * config.fall_load_n])
+        load = config.fall_load_n * (0.99 + 0.01 * sin(_SWING_RAD_S * since_s))  # who hangs swings a little
+        return np.array([(1.0 - part) * forward, (1.0 - part) * left, (1.0 - part) * up - part * load])
     forward, left, up = _walking(config, time_s)
     if config.script == "push" and 0.0 <= since_s < config.push_s:
         left += config.push_force_n

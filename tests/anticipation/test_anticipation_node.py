@@ -26,7 +26,8 @@ class Bench:
     def __init__(self, checkpoint: Path) -> None:
         self.clock = ManualClock(START_NS)
         hub = MemoryHub(self.clock)
-        config = SurefootConfig(anticipation={"checkpoint": str(checkpoint)})
+        still = {"stuck_after_s": 0.0}  # the person of these tests stands like a statue
+        config = SurefootConfig(anticipation={"checkpoint": str(checkpoint)}, inputs=still)
         self.node: AnticipationNode = create(
             NodeContext(config, hub.transport(), self.clock, logging.getLogger("test"), {})
         )

@@ -84,7 +84,7 @@ def horizon(stamp_ns: int, sequence: int = 0, fall: float = 0.02) -> FallHorizon
         stamp_ns=stamp_ns,
         sequence=sequence,
         probabilities=probabilities,
-        distance=np.linspace(4.0, 3.0, 16),
+        distance=np.linspace(4.0, 3.0, 16) + 1e-6 * (sequence % 2),  # what is measured is never twice the same
         distance_rate=np.full(16, -2.0),
         time_to_boundary=np.full(16, np.inf),
         centre_distance=np.full((16, 3), 2.0),

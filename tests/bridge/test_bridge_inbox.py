@@ -70,16 +70,64 @@ def test_the_newest_sample_wins_and_late_ones_change_nothing(hub: MemoryHub, clo
 
 def test_a_restarted_publisher_is_followed_but_a_replayed_old_one_is_not(hub: MemoryHub, clock: ManualClock) -> None:
     inbox = Inbox[Wrench](hub.transport(), WRENCH)
-    inbox._store(Sample(encode(WRENCH, wrench(START, 1)), 900, b"a" * 16, START))
-    assert inbox.read(START).message is not None
-    inbox._store(Sample(encode(WRENCH, wrench(START - 5_000_000, 2)), 0, b"b" * 16, START))
-    kept = inbox.read(START).message
-    assert kept is not None
-    assert kept.force[0] == 1
-    inbox._store(Sample(encode(WRENCH, wrench(START + 1_000_000, 3)), 0, b"c" * 16, START))
-    followed = inbox.read(START + 1_000_000).message
-    assert followed is not None
-    assert followed.force[0] == 3
+    put(inbox, b"a", 900, START, x=1)
+    assert force(inbox, START) == 1
+    later = clock.advance(0.1)  # longer than a publisher may be silent
+    put(inbox, b"b", 0, later, x=2, stamp_ns=START - 5_000_000)
+    assert force(inbox, later) == 1
+    put(inbox, b"c", 0, later + 1_000_000, x=3)
+    assert force(inbox, later + 1_000_000) == 3
+
+
+def put(inbox: Inbox[Wrench], source: bytes, number: int, at_ns: int, x: float, stamp_ns: int | None = None) -> None:
+    payload = encode(WRENCH, wrench(at_ns if stamp_ns is None else stamp_ns, x))
+    inbox._store(Sample(payload, number, source * 16, at_ns))
+
+
+def force(inbox: Inbox[Wrench], now_ns: int) -> float | None:
+    message = inbox.read(now_ns).message
+    return None if message is None else float(message.force[0])
+
+
+def test_of_two_publishers_the_first_is_followed_and_the_other_named(hub: MemoryHub, clock: ManualClock) -> None:
+    inbox = Inbox[Wrench](hub.transport(), WRENCH)
+    for number in range(20):
+        now = clock.advance(0.01)
+        put(inbox, b"a", number, now, x=1)
+        assert force(inbox, now) == 1
+        assert (inbox.rival(now) == "") == (number < 6)
+        if number >= 5:
+            put(inbox, b"b", number, now + 1, x=2)
+            inbox._store(Sample(b"garbage", number, b"c" * 16, now + 2))
+        assert force(inbox, now + 3) == 1
+        assert inbox.read(now + 3).ok, "what others send is not this stream's fault"
+    assert inbox.rival(now) == "two publishers of wrench: the first is followed, the other refused"
+
+
+def test_a_flood_by_another_crowds_nobody_out(hub: MemoryHub, clock: ManualClock) -> None:
+    inbox = Inbox[Wrench](hub.transport(), WRENCH)
+    put(inbox, b"a", 0, clock.now_ns(), x=1)
+    assert force(inbox, clock.now_ns()) == 1
+    for number in range(1, 10):
+        now = clock.advance(0.01)
+        put(inbox, b"a", number, now, x=number)
+        for flood in range(100):
+            put(inbox, b"b", flood, now + flood, x=99)
+        assert force(inbox, now + 200) == number
+
+
+def test_the_other_publisher_takes_over_when_the_first_falls_silent(hub: MemoryHub, clock: ManualClock) -> None:
+    inbox = Inbox[Wrench](hub.transport(), WRENCH)
+    put(inbox, b"a", 0, START, x=1)
+    assert force(inbox, START) == 1
+    followed = []
+    for number in range(12):
+        now = clock.advance(0.01)
+        put(inbox, b"b", number, now, x=2)
+        followed.append(force(inbox, now))
+    assert followed == [1.0] * 6 + [2.0] * 6, "60 ms is what a wrench may be old"
+    assert inbox.rival(now), "said for a second"
+    assert inbox.rival(clock.advance(1.1)) == ""
 
 
 def test_a_stamp_from_the_future_is_refused(hub: MemoryHub, clock: ManualClock) -> None:

@@ -92,7 +92,10 @@ class Bench:
             now_ns = NS + self._turn * PERIOD_NS
             self.clock.sleep_until(now_ns)
             if "fall_horizon" not in self.lost and self._turn % 3 == 0:
-                self._send("fall_horizon", horizon(now_ns, **self.person))
+                alive = self.person.get("distance", 5.0) + 1e-9 * (
+                    self._turn % 2
+                )  # measured, so never still
+                self._send("fall_horizon", horizon(now_ns, **{**self.person, "distance": alive}))
             if "wrench" not in self.lost:
                 self._send("wrench", wrench(now_ns))
             if "odom" not in self.lost:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from bridge.config.inputs import InputsConfig
 from bridge.config.surefoot import SurefootConfig
 from bridge.inbox import Inbox
 from bridge.lockstep import LockStep
@@ -37,7 +38,7 @@ class Loop:
 
     def __init__(self) -> None:
         self.system = LockStep(
-            SurefootConfig(),
+            SurefootConfig(inputs=InputsConfig(stuck_after_s=0.0)),  # the horizon never changes
             {
                 "drive": ("simulation.drive.node", {"script": "fall", "event_s": "2.0", "fall_hold_s": "1.0"}),
                 "controller": ("controller.node", {"controller": "log"}),
