@@ -13,21 +13,11 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from numpy.typing import NDArray
 
+from bridge.colours import FAINT, FALL, FORECAST, INK, STABLE, STATE_COLOUR, TRANSIENT
 from bridge.config.intervention import InterventionConfig
 from bridge.launch.timeline import Row, Snapshot
 from bridge.messages import Floats
 
-STABLE, TRANSIENT, FALL = "#2f6fb3", "#ee8a1d", "#c8322b"
-FORECAST: Final = "#00b4c8"
-INK, FAINT = "#222222", "#9a9a9a"
-STATE_COLOUR: Final = {
-    "DISARMED": "#ececec",
-    "FOLLOW": "#d6e6f5",
-    "GUARD": "#fbd9a3",
-    "ARREST": "#f2a79f",
-    "RECOVER": "#cfe8cf",
-    "SAFE_STOP": "#c4c4c4",
-}
 LABEL_COLOUR: Final = {-1: STABLE, 0: TRANSIENT, 1: FALL}
 LABEL_TEXT: Final = {-1: "walking", 0: "falling", 1: "lying"}
 DOTS_PER_INCH: Final = 110

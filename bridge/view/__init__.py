@@ -1,0 +1,1 @@
+"""Looking at a running system, or at a recording of one, in Rerun. Listens only."""

@@ -1,0 +1,146 @@
+"""`surefoot view`: what is shown, and where."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+
+from bridge.clock import SystemClock
+from bridge.config.load import load_config
+from bridge.config.perception import SourceConfig
+from bridge.config.surefoot import SurefootConfig
+from bridge.errors import ConfigError, SourceError
+from bridge.launch.watch import StopSignals
+from bridge.record.options import ConfigOption, OverwriteOption, SetOption, config_path
+from bridge.record.reader import Recording
+from bridge.transport.zenoh import ZenohTransport
+from bridge.view import viewer
+from bridge.view.extra import load_rerun
+from bridge.view.rrd import RrdFile
+from bridge.view.studio import Studio, Subject, require_messages
+from bridge.view.video import Still, Video
+
+WEB_PORT: Final = 9090
+NICENESS: Final = 10  # what is watched goes first
+WAIT_S: Final = 0.1
+
+
+def view(
+    recording: Annotated[
+        Path | None, typer.Argument(metavar="[RECORDING]", help="An .mcap file or rosbag2 folder; none: what runs now.")
+    ] = None,
+    save: Annotated[
+        Path | None, typer.Option(metavar="FILE.rrd", help="Write a file for Rerun instead of opening a window.")
+    ] = None,
+    serve: Annotated[
+        bool, typer.Option("--serve", help="Show it in a browser instead of a window; on this machine only.")
+    ] = False,
+    port: Annotated[
+        int, typer.Option(min=1024, max=65534, help="Of the page; its data are at the next port.")
+    ] = WEB_PORT,
+    window: Annotated[
+        bool | None, typer.Option("--window/--no-window", help="Default: a window unless --save or --serve is given.")
+    ] = None,
+    video: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Video or image folder that perception saw, laid underneath.")
+    ] = None,
+    crop: Annotated[str | None, typer.Option(metavar="X,Y,W,H", help="Part of the video that was used.")] = None,
+    video_offset: Annotated[float, typer.Option(metavar="S", help="Show the video this much later [s].")] = 0.0,
+    duration: Annotated[float | None, typer.Option(min=0, metavar="S", help="Stop after this long [s].")] = None,
+    overwrite: OverwriteOption = False,
+    config: ConfigOption = None,
+    set_: SetOption = None,
+) -> int:
+    """Look at what runs now, or at a recording, in Rerun: person, plane, horizon, control, health.
+
+    Only listens: whatever happens to it, the running control notices nothing. Ends with Ctrl-C,
+    SIGTERM, its window, or --duration. Exit code 2: bad input, no display, a file that cannot be written.
+
+    Examples: `surefoot view` beside `surefoot up`;
+    `surefoot view walk.mcap`; `surefoot view walk.mcap --save walk.rrd --video walk.mp4`.
+    """
+    loaded = load_config(config_path(config), set_ or [])
+    rerun = load_rerun()
+    found = None if recording is None else Recording(recording)
+    if found is not None:
+        require_messages(found)
+    subject = Subject(
+        loaded,
+        importlib.import_module("anticipation.plane_file").read_plane(loaded.anticipation.checkpoint),
+        importlib.import_module("perception.skeleton").LINKS,
+        _video(video, crop, loaded.perception.source, video_offset, live=found is None),
+    )
+    with ExitStack() as stack:
+        stop = stack.enter_context(StopSignals())
+        file = None if save is None else stack.enter_context(RrdFile(save, overwrite=overwrite))
+        viewers = []
+        if serve:
+            viewers.append(stack.enter_context(viewer.web(rerun.viewer, port)))
+            typer.echo(f"open {viewer.page(port)}", err=True)
+        if window if window is not None else not serve and save is None:
+            viewers.append(stack.enter_context(viewer.window(rerun.viewer)))
+        if not viewers and file is None:
+            raise ConfigError("--no-window leaves nothing to show on: add --save FILE.rrd or --serve")
+        studio = Studio(rerun, subject, viewers, file)
+        until_s = None if duration is None else time.monotonic() + duration
+
+        def ended() -> bool:
+            over = until_s is not None and time.monotonic() >= until_s
+            return over or stop.seen is not None or not studio.watched
+
+        if found is None:
+            _live(studio, loaded, ended)
+            studio.finish()
+        else:
+            studio.show_recording(found, ended)
+            studio.finish()
+            if found.damage:
+                typer.echo(f"{found.path}: not whole: {found.damage}", err=True)
+            while viewers and not ended():
+                time.sleep(WAIT_S)
+    if save is not None:
+        typer.echo(f"{save}: {save.stat().st_size / 1e6:.2f} MB", err=True)
+    return 0
+
+
+def _live(studio: Studio, config: SurefootConfig, ended: Callable[[], bool]) -> None:
+    os.nice(NICENESS)
+    typer.echo("listening only; Ctrl-C ends it", err=True)
+    clock = SystemClock()
+    with closing(ZenohTransport(config.bridge, "viewer", clock)) as transport:
+        lost = studio.show_live(transport, clock, ended)
+    if lost:
+        typer.echo(f"{lost} messages came faster than they could be drawn and are not shown", err=True)
+
+
+def _video(video: Path | None, crop: str | None, source: SourceConfig, offset_s: float, *, live: bool) -> Video | None:
+    """Return the pictures to lay under the keypoints: those asked for, or, live, those the config's source plays."""
+    path = video
+    if path is None and live and source.uri and not source.uri.endswith(".npz") and Path(source.uri).exists():
+        path = Path(source.uri)
+    if path is None:
+        if crop is not None:
+            raise ConfigError("--crop is for the video, and there is none: --video FILE")
+        return None
+    if not path.exists():
+        raise SourceError(f"{path}: no such video file")
+    used: Any = tuple(source.crop_px) or None
+    if crop is not None:
+        used = importlib.import_module("perception.sources.picture").parse_crop(crop)
+    return Video(str(path), partial(_stills, path, used, source.fps_hz), offset_s)
+
+
+def _stills(path: Path, crop: Any, fps_hz: float) -> Iterator[Still]:
+    module, function = ("image_folder", "open_folder") if path.is_dir() else ("video_file", "open_video")
+    stills: Iterator[Still] = getattr(importlib.import_module(f"perception.sources.{module}"), function)(
+        path, crop, fps_hz
+    )
+    return stills
