@@ -44,6 +44,12 @@ class MachineLimits:
 
     Attributes:
         rows: (12, 4) four wheels' torque, four directions of traction, four tipping edges (front, rear, left, right).
+        drive_map: (8, 3) what a force on the base (F_x, F_y, M_z) makes of wheels' torque and traction.
+        drive_high: (8,) their limits without a person.
+        edges: (4, 3) what the moments (N x_zmp, N y_zmp, N) make of the tipping rows.
+        grip: part of the weight that grips whatever the column does.
+        column_force: largest force of the column [N].
+        acceleration: (4,) largest accelerations.
     """
 
     def __init__(self, walker: Walker) -> None:
@@ -51,32 +57,32 @@ class MachineLimits:
         self._walker = walker
         self._weight = walker.weight
         self._half = np.array([0.5 * config.wheelbase_m, 0.5 * config.track_m]) - config.support_margin_m
-        self._column_force = config.column_force_max_n
-        self._acceleration: Floats = np.array(config.acceleration_max)
+        self.column_force = config.column_force_max_n
+        self.acceleration: Floats = np.array(config.acceleration_max)
         # The column's own acceleration may take this much load off the floor; the rest grips.
-        self._grip = 1.0 - config.carriage_mass_kg * config.column_acceleration_max_m_s2 / self._weight
-        self._drive_high: Floats = np.repeat([1.0, self._grip], 4)
-        self._drive_low: Floats = -self._drive_high
+        self.grip = 1.0 - config.carriage_mass_kg * config.column_acceleration_max_m_s2 / self._weight
+        self.drive_high: Floats = np.repeat([1.0, self.grip], 4)
+        self._drive_low: Floats = -self.drive_high
         self._wheel_map: Floats = walker.wheel_force / config.wheel_torque_max_nm
         angles = np.pi / 8 + np.arange(4) * np.pi / 4
         # The octagon lies inside the circle: its faces are cos(22.5 deg) of the radius away.
         self._traction_map: Floats = np.stack([np.cos(angles), np.sin(angles)], axis=1) / (
             config.friction_coefficient * self._weight * np.cos(np.pi / 8)
         )
-        self._drive_map: Floats = np.zeros((8, 3))
-        self._drive_map[WHEEL_ROWS] = self._wheel_map
-        self._drive_map[TRACTION_ROWS, :2] = self._traction_map
+        self.drive_map: Floats = np.zeros((8, 3))
+        self.drive_map[WHEEL_ROWS] = self._wheel_map
+        self.drive_map[TRACTION_ROWS, :2] = self._traction_map
         self.rows: Floats = np.zeros((ROWS, 4))
-        self._edges: Floats = np.zeros((4, 3))
+        self.edges: Floats = np.zeros((4, 3))
         for edge in range(4):
             axis, sign = edge // 2, 1.0 - 2.0 * (edge % 2)
-            self._edges[edge, axis] = sign / (self._weight * self._half[axis])
-            self._edges[edge, 2] = -1.0 / self._weight
+            self.edges[edge, axis] = sign / (self._weight * self._half[axis])
+            self.edges[edge, 2] = -1.0 / self._weight
         # Limits without a wrench and their change by a whole one, refilled at every step; tip-over has no lower limit.
         self._lines: Floats = np.zeros((2, 2 * ROWS + 8))
         self._at_none, self._slope = _parts(self._lines[0]), _parts(self._lines[1])
         self._at_none.low[TIP_ROWS] = -np.inf
-        self._at_none.box_low[:], self._at_none.box_high[:] = -self._acceleration, self._acceleration
+        self._at_none.box_low[:], self._at_none.box_high[:] = -self.acceleration, self.acceleration
         self.linearise(walker.terms)
 
     def linearise(self, terms: WalkerTerms) -> None:
@@ -84,7 +90,7 @@ class MachineLimits:
         self.rows[WHEEL_ROWS, :3] = self._wheel_map @ terms.mass[:3, :3]
         floor = terms.mass - self._walker.reflected
         self.rows[TRACTION_ROWS] = self._traction_map @ floor[:2]
-        self.rows[TIP_ROWS] = self._edges @ moments_by_acceleration(terms)
+        self.rows[TIP_ROWS] = self.edges @ moments_by_acceleration(terms)
 
     def bounds(self, terms: WalkerTerms, wrench: Floats, fading: Floats) -> MachineBounds:
         """Return the limits at instants at which `fading` (stages,) of `wrench` is left.
@@ -96,33 +102,33 @@ class MachineLimits:
         """
         push = wrench @ terms.interface
         # What each row would carry at no acceleration, without the person and by the person.
-        alone, by_person = self._drive_map @ terms.bias[:3], self._drive_map @ push[:3]
+        alone, by_person = self.drive_map @ terms.bias[:3], self.drive_map @ push[:3]
         resting, pushed = moments_at_rest(terms, self._weight, wrench)
         lifted = float(wrench[2]) / self._weight
         inertia = float(terms.mass[3, 3])
-        force, load, hanging = (value / inertia for value in (self._column_force, float(terms.bias[3]), float(push[3])))
+        force, load, hanging = (value / inertia for value in (self.column_force, float(terms.bias[3]), float(push[3])))
 
         # Every limit is a straight line over what is left of the wrench.
         at_none, slope = self._at_none, self._slope
         np.subtract(self._drive_low, alone, out=at_none.low[DRIVE_ROWS])
-        np.subtract(self._drive_high, alone, out=at_none.high[DRIVE_ROWS])
+        np.subtract(self.drive_high, alone, out=at_none.high[DRIVE_ROWS])
         slope.low[DRIVE_ROWS] = slope.high[DRIVE_ROWS] = by_person
         slope.low[TRACTION_ROWS] += lifted
         slope.high[TRACTION_ROWS] -= lifted
-        at_none.high[TIP_ROWS] = -(self._edges @ resting)
-        slope.high[TIP_ROWS] = -(self._edges @ pushed)
+        at_none.high[TIP_ROWS] = -(self.edges @ resting)
+        slope.high[TIP_ROWS] = -(self.edges @ pushed)
         at_none.box_low[3], at_none.box_high[3] = -force - load, force - load
         slope.box_low[3] = slope.box_high[3] = hanging
         values = fading[:, None] * self._lines[1]
         values += self._lines[0]
         bounds = _parts(values)
-        if min(self._grip, self._grip - lifted) < 0.0:
+        if min(self.grip, self.grip - lifted) < 0.0:
             # Less load than none grips nothing.
-            missing = np.maximum(fading * lifted - self._grip, 0.0)[:, None]
+            missing = np.maximum(fading * lifted - self.grip, 0.0)[:, None]
             bounds.low[:, TRACTION_ROWS] -= missing
             bounds.high[:, TRACTION_ROWS] += missing
         column = values[:, _COLUMN]
-        most = float(self._acceleration[3])
+        most = float(self.acceleration[3])
         np.minimum(np.maximum(column, -most, out=column), most, out=column)
         return bounds
 
@@ -149,7 +155,7 @@ class MachineLimits:
                 float((high[row] - self.rows[row] @ value) / self.rows[row, axis] + value[axis]) for row in (fore, back)
             )
             value[axis] = min(max(float(value[axis]), least), most) if least <= most else 0.5 * (least + most)
-        return np.clip(value, -self._acceleration, self._acceleration)
+        return np.clip(value, -self.acceleration, self.acceleration)
 
 
 def _parts(values: Floats) -> MachineBounds:

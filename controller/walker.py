@@ -40,6 +40,16 @@ class WalkerTerms(NamedTuple):
         return float(self.bias[3])
 
 
+class Body(NamedTuple):
+    """A rigid body of the walker, as it lies with the base at the origin and the interface on the floor."""
+
+    mass_kg: float
+    centre: Floats  # (3,) centre of mass in the base frame [m]
+    inertia: Floats  # (3, 3) about the centre of mass, base frame axes [kg m^2]
+    spin: Floats  # (3,) speed about the base's y axis for unit (v_x, v_y, yaw rate): wheels
+    lifted: float  # 1 if it rises with the column, else 0
+
+
 class Walker:
     """Rigid-body model of a configured walker, evaluated without allocating.
 
@@ -47,6 +57,7 @@ class Walker:
         wheel_jacobian: (4, 3), wheel speeds [rad/s] = J (v_x, v_y, yaw rate).
         wheel_force: (4, 3), least-norm wheel torques [N m] that give the base a wanted force (F_x, F_y, M_z).
         reflected: (4, 4), the part of the mass matrix that turns with wheels and motors and never loads the floor.
+        rotors: (4, 4), the motors' part of that.
         weight: weight of the whole walker [N].
     """
 
@@ -80,6 +91,7 @@ class Walker:
         spinning = armature.copy()
         spinning[wheel_v] += wheels
         self.reflected: Floats = self._reduce.T @ (spinning[:, None] * self._reduce)
+        self.rotors: Floats = self._reduce.T @ (armature[:, None] * self._reduce)
         self.weight = config.mass_kg * config.gravity_m_s2
         self._model.gravity.linear = np.array([0.0, 0.0, -config.gravity_m_s2])
 
@@ -113,6 +125,31 @@ class Walker:
         np.dot(jacobian, self._reduce, out=terms.interface)
         terms.interface_position[:] = data.oMf[self._interface_id].translation
         return terms
+
+    def bodies(self) -> tuple[list[Body], Floats]:
+        """Return the bodies and the interface's position (3,), both with the interface on the floor, base frame [m]."""
+        data = self._model.createData()
+        q = pin.neutral(self._model)
+        q[self._column_q] = 0.0
+        pin.framesForwardKinematics(self._model, data, q)
+        found = []
+        for joint, inertia in enumerate(self._model.inertias):
+            name = self._model.names[joint]
+            if joint == 0:
+                continue  # the universe
+            placement = data.oMi[joint]
+            turn = np.array(placement.rotation)
+            spin = self.wheel_jacobian[WHEELS.index(name)] if name in WHEELS else np.zeros(3)
+            found.append(
+                Body(
+                    float(inertia.mass),
+                    np.array(placement.act(inertia.lever)),
+                    turn @ np.array(inertia.inertia) @ turn.T,
+                    spin,
+                    1.0 if name == "column" else 0.0,
+                )
+            )
+        return found, np.array(data.oMf[self._interface_id].translation)
 
     def _indices(self, joint: str) -> tuple[int, int]:
         handle = self._model.joints[self._model.getJointId(joint)]
