@@ -45,6 +45,7 @@ class GateLimits:
     lifetime_s: float
     future_tolerance_s: float
     excess_fraction: float
+    frame_age_s: float
 
     def axes(self) -> tuple[AxisLimits, AxisLimits, AxisLimits, AxisLimits]:
         """Return the limits of forward, left, yaw and column."""
@@ -137,7 +138,7 @@ class SafetyGate:
             return str(error)
         if not (np.isfinite(command.damping).all() and np.isfinite(command.stiffness).all()):
             return "command damping or stiffness is not finite"
-        late = self._judge_time(command, now_ns)
+        late = self._judge_time(command, now_ns) or self._judge_frame(command, now_ns)
         return late if late or not command.valid else self._judge_values(command)
 
     def _judge_time(self, command: SupportCommand, now_ns: int) -> str:
@@ -154,6 +155,13 @@ class SafetyGate:
         if self._ordered and command.sequence <= self._sequence and not (repeated or restarted):
             return f"command {command.sequence} came after {self._sequence}"
         return ""
+
+    def _judge_frame(self, command: SupportCommand, now_ns: int) -> str:
+        """A controller that goes on about a picture that stands still stamps its commands as ever."""
+        age_ms, limit_ms = (now_ns - command.rests_on_ns) / 1e6, self._limits.frame_age_s * 1e3
+        if not command.valid or command.rests_on_ns == 0 or age_ms <= limit_ms:
+            return ""
+        return f"command rests on a camera frame {age_ms:.0f} ms old, limit {limit_ms:.0f}"
 
     def _judge_values(self, command: SupportCommand) -> str:
         slack = 1.0 + self._limits.excess_fraction

@@ -51,6 +51,9 @@ class GateConfig(Section):
     future_tolerance_s: float = Field(default=0.050, ge=0, le=0.5)
     """How far ahead of the reader's clock a command may be stamped [s]."""
 
+    frame_age_s: float = Field(default=0.25, gt=0, le=1)
+    """Oldest camera frame that a command may rest on [s]; a command that names no frame is not judged by it."""
+
     excess_fraction: float = Field(default=0.1, ge=0, le=1)
     """A value beyond its limit by up to this fraction is clipped; beyond that the command is refused."""
 

@@ -25,6 +25,7 @@ LIMITS = GateLimits(
     lifetime_s=0.06,
     future_tolerance_s=0.05,
     excess_fraction=0.1,
+    frame_age_s=0.25,
 )
 PERIOD_NS = 10 * MS
 HANDED_THROUGH = (

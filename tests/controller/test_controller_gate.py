@@ -62,7 +62,7 @@ class TestPassing:
             lifetime_s=0.03,
             sequence=17,
             reason="near the boundary",
-            rests_on_ns=123,
+            rests_on_ns=NS - 20 * MS,
             fall_distance=0.4,
             fall_probability=0.6,
             solve_time_s=0.001,
@@ -189,6 +189,15 @@ class TestTime:
         gate, asked = make_gate(), command(sequence=4)
         verdicts = [gate.filter(asked, NS + k * PERIOD_NS).valid for k in range(9)]
         assert verdicts == [True] * 7 + [False] * 2
+
+    def test_a_command_rests_on_a_recent_frame(self) -> None:
+        """A controller that goes on about a picture that stands still stamps its commands as ever."""
+        assert make_gate().filter(command(2 * NS, rests_on_ns=2 * NS - 250 * MS), 2 * NS).valid
+        out = make_gate().filter(command(2 * NS, rests_on_ns=2 * NS - 251 * MS), 2 * NS)
+        assert (out.valid, out.reason) == (False, "command rests on a camera frame 251 ms old, limit 250")
+        assert make_gate().filter(command(2 * NS, rests_on_ns=0), 2 * NS).valid, "a controller without a camera"
+        stop = command(2 * NS, rests_on_ns=NS, valid=False, reason="because")
+        assert make_gate().filter(stop, 2 * NS).reason == "because"
 
 
 class TestOrder:
