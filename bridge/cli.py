@@ -39,6 +39,8 @@ COMMANDS: Final = {
     "info": Command("bridge.record.info_command:info", "Say what is in a recording, also one that was cut off."),
     "replay": Command("bridge.record.replay_command:replay", "Replay a recording to everyone or to one process."),
     "view": Command("bridge.view.command:view", "Look at what runs, or at a recording, in Rerun."),
+    "keys": Command("bridge.keys.command:keys", "Make and look at the certificates of the roles."),
+    "router": Command("bridge.launch.router:router", "Join the processes of several machines."),
     "train": Command("anticipation.training.commands:train", "Train the anticipation networks."),
     "evaluate": Command(
         "anticipation.training.evaluation.command:evaluate", "Measure the anticipation, split by sequence."
@@ -75,14 +77,17 @@ def _app(words: Sequence[str]) -> typer.Typer:
     app.callback()(_surefoot)
     wanted = next((word for word in words if not word.startswith("-")), None)
     for name, command in COMMANDS.items():
-        function = _load(command.target) if name == wanted else _not_loaded
-        app.command(name, short_help=command.purpose)(function)
+        loaded = _load(command.target) if name == wanted else _not_loaded
+        if isinstance(loaded, typer.Typer):  # a command with commands of its own
+            app.add_typer(loaded, name=name, short_help=command.purpose)
+        else:
+            app.command(name, short_help=command.purpose)(loaded)
     return app
 
 
-def _load(target: str) -> Callable[..., Any]:
+def _load(target: str) -> Callable[..., Any] | typer.Typer:
     module, _, function = target.partition(":")
-    loaded: Callable[..., Any] = getattr(importlib.import_module(module), function)
+    loaded: Callable[..., Any] | typer.Typer = getattr(importlib.import_module(module), function)
     return loaded
 
 

@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -24,6 +25,7 @@ from bridge.outbox import Outbox
 from bridge.realtime import raise_priority
 from bridge.topics import DIAGNOSTICS
 from bridge.transport.interface import Transport
+from bridge.transport.wire_log import WireLog
 from bridge.transport.zenoh import ZenohTransport
 
 
@@ -94,12 +96,13 @@ def main(role: str, factory: Factory, arguments: Sequence[str] | None = None, pr
         path = Path(parsed.config) if parsed.config else None
         config = load_config(path, parsed.set)
         clock = SystemClock()
-        transport = ZenohTransport(config.bridge, role, clock)
-        try:
-            context = NodeContext(config, transport, clock, logging.getLogger(role), options, path, tuple(parsed.set))
+        log = logging.getLogger(role)
+        with ExitStack() as stack:
+            if config.bridge.keys:
+                stack.enter_context(WireLog(log))
+            transport = stack.enter_context(closing(ZenohTransport(config.bridge, role, clock)))
+            context = NodeContext(config, transport, clock, log, options, path, tuple(parsed.set))
             _serve(role, factory, context, stop, parsed.after, priority(config))
-        finally:
-            transport.close()
     except SurefootError as error:
         print(f"surefoot {role}: {error}", file=sys.stderr)  # noqa: T201 (the one line a user reads)
         return error.exit_code

@@ -1,139 +1,103 @@
-"""The wire between processes and machines: one Zenoh peer per process, explicit endpoints, no discovery.
-
-Each sample carries an attachment laid out as rmw_zenoh's: sequence number (int64),
-source timestamp [ns] (int64), length of the publisher's identifier (uint8 = 16) and
-the identifier, all little-endian.
-"""
+"""The wire between processes and machines: one Zenoh session per process, explicit endpoints, no discovery."""
 
 from __future__ import annotations
 
+import itertools
 import json
+import logging
 import os
-import struct
 from collections.abc import Callable
-from typing import Any, Final
+from pathlib import Path
+from typing import Any
 
 import zenoh
 
 from bridge.clock import Clock
-from bridge.config.bridge import BridgeConfig
+from bridge.config.bridge import BridgeConfig, is_authenticated
 from bridge.errors import TransportError
+from bridge.keys.check import Credentials, load_credentials
+from bridge.keys.identity import ROUTER, identity_of
 from bridge.topics import Topic
+from bridge.transport.attachment import IDENTIFIER_BYTES, pack, unpack
 from bridge.transport.interface import Sample
+from bridge.transport.names import names_of, type_hash
+from bridge.transport.rmw_zenoh import OFFERED_QOS, Endpoint, identifier
+from bridge.transport.session import zenoh_settings
 
-_ATTACHMENT: Final = struct.Struct("<qqB16s")
-_ENCODING: Final = zenoh.Encoding.APPLICATION_CDR if hasattr(zenoh.Encoding, "APPLICATION_CDR") else None
-
-
-def _zenoh_config(config: BridgeConfig, role: str) -> Any:
-    """Return the Zenoh configuration of `role`: it listens where its endpoint is and connects to the others.
-
-    Roles connect only to those listed before them, so that a pair of processes
-    opens one link and not two; a role without an endpoint connects to all.
-    """
-    roles = list(config.endpoints)
-    listens = role in config.endpoints
-    others = roles[: roles.index(role)] if listens else roles
-    settings: dict[str, object] = {
-        "mode": "peer",
-        "listen/endpoints": [config.endpoints[role]] if listens else [],
-        "listen/exit_on_failure": True,
-        "connect/endpoints": [config.endpoints[other] for other in others] + list(config.connect),
-        "connect/timeout_ms": -1,
-        "connect/exit_on_failure": False,
-        "connect/retry": {"period_init_ms": 100, "period_max_ms": 400, "period_increase_factor": 1.5},
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-        "transport/link/tx/lease": config.lease_ms,
-        "transport/link/tx/keep_alive": 4,
-        "transport/link/rx/max_message_size": 1 << 20,
-        "transport/shared_memory/enabled": False,
-    }
-    result = zenoh.Config()
-    for path, value in settings.items():
-        result.insert_json5(path, json.dumps(value))
-    return result
-
-
-def _parse_attachment(attachment: Any) -> tuple[int, bytes]:
-    raw = b"" if attachment is None else attachment.to_bytes()
-    if len(raw) != _ATTACHMENT.size:
-        return -1, b""
-    sequence, _stamp, length, source = _ATTACHMENT.unpack(raw)
-    return (sequence, source) if length == 16 else (-1, b"")
+_LOG = logging.getLogger("bridge.transport")
 
 
 class _ZenohPublisher:
-    def __init__(self, publisher: Any) -> None:
-        self._publisher, self._source, self._sequence = publisher, os.urandom(16), 0
+    def __init__(self, publisher: Any, source: bytes, token: Any) -> None:
+        self._publisher, self._source, self._token, self._sequence = publisher, source, token, 0
 
     def put(self, payload: bytes, stamp_ns: int) -> None:
-        attachment = _ATTACHMENT.pack(self._sequence, stamp_ns, 16, self._source)
-        self._publisher.put(payload, attachment=attachment)
+        self._publisher.put(payload, attachment=pack(self._sequence, stamp_ns, self._source))
         self._sequence += 1
 
     def close(self) -> None:
         self._publisher.undeclare()
+        if self._token is not None:
+            self._token.undeclare()
 
 
 class _ZenohHandle:
-    def __init__(self, entity: Any) -> None:
-        self._entity = entity
+    def __init__(self, *entities: Any) -> None:
+        self._entities = entities
 
     def close(self) -> None:
-        if self._entity is not None:
-            self._entity.undeclare()
-            self._entity = None
+        entities, self._entities = self._entities, ()
+        for entity in entities:
+            entity.undeclare()
 
 
 class ZenohTransport:
     """`Transport` over a Zenoh session of its own.
 
     Raises:
-        TransportError: the endpoint of `role` is taken or malformed.
+        TransportError: the endpoint of `role` is taken or malformed, or wants certificates where there are none.
+        KeysError: the certificates of `role` cannot be used.
     """
 
     def __init__(self, config: BridgeConfig, role: str, clock: Clock) -> None:
-        self._namespace, self._clock = config.namespace, clock
+        self._clock, self._names = clock, names_of(config)
         self._declared: list[_ZenohHandle] = []  # Zenoh undeclares what nobody refers to any more
-        try:
-            self._session: Any = zenoh.open(_zenoh_config(config, role))
-        except zenoh.ZError as error:
-            endpoint = config.endpoints.get(role, "none")
-            detail = str(error)
-            if "Address already in use" in detail or "os error 98" in detail:
-                raise TransportError(
-                    f"{role} cannot listen on {endpoint}: the port is in use (is another {role} running?); "
-                    f"set bridge.endpoints.{role}"
-                ) from error
-            raise TransportError(f"{role} cannot open the wire at {endpoint}: {detail.splitlines()[0]}") from error
+        self._session: Any = open_session(config, role)
+        self._entities = itertools.count(1)  # 0 is the node itself
+        self._node = self._names.node(str(self._session.info.zid()), role)
+        if self._node is not None:
+            self._keep(self._session.liveliness().declare_token(self._node.token()))
 
     def publisher(self, topic: Topic) -> _ZenohPublisher:
         """Declare `topic`; samples are dropped rather than queued when a reader is slow."""
-        return _ZenohPublisher(
-            self._session.declare_publisher(
-                f"{self._namespace}/{topic.key}",
-                encoding=_ENCODING,
-                congestion_control=zenoh.CongestionControl.DROP,
-                priority=getattr(zenoh.Priority, topic.priority.upper()),
-                express=topic.express,
-            )
+        encoding = self._names.encoding
+        publisher = self._session.declare_publisher(
+            self._names.key(topic),
+            encoding=None if encoding is None else zenoh.Encoding(encoding),
+            congestion_control=zenoh.CongestionControl.DROP,
+            priority=getattr(zenoh.Priority, topic.priority.upper()),
+            express=topic.express,
         )
+        key, token = self._show(Endpoint.PUBLISHER, topic)
+        return _ZenohPublisher(publisher, identifier(key) if key else os.urandom(IDENTIFIER_BYTES), token)
 
     def subscribe(self, topic: Topic, callback: Callable[[Sample], None]) -> _ZenohHandle:
         """Call `callback` from Zenoh's own thread with every sample of `topic`."""
         clock = self._clock
 
         def receive(sample: Any) -> None:
-            sequence, source = _parse_attachment(sample.attachment)
+            attachment = sample.attachment
+            sequence, source = unpack(b"" if attachment is None else attachment.to_bytes())
             callback(Sample(sample.payload.to_bytes(), sequence, source, clock.now_ns()))
 
         handler = zenoh.handlers.Callback(receive, indirect=False)
-        return self._keep(self._session.declare_subscriber(f"{self._namespace}/{topic.key}", handler))
+        subscriber = self._session.declare_subscriber(self._names.key(topic), handler)
+        _key, token = self._show(Endpoint.SUBSCRIPTION, topic)
+        return self._keep(subscriber) if token is None else self._keep(subscriber, token)
 
     def declare_alive(self, role: str) -> _ZenohHandle:
         """Declare the liveliness token of `role`; it vanishes with the process."""
-        return self._keep(self._session.liveliness().declare_token(f"{self._namespace}/alive/{role}"))
+        return self._keep(self._session.liveliness().declare_token(self._names.alive(role)))
 
     def watch_alive(self, callback: Callable[[str, bool], None]) -> _ZenohHandle:
         """Call `callback(role, alive)` for the roles alive now and at every change."""
@@ -143,8 +107,7 @@ class ZenohTransport:
             callback(role, sample.kind == zenoh.SampleKind.PUT)
 
         handler = zenoh.handlers.Callback(receive, indirect=False)
-        tokens = f"{self._namespace}/alive/*"
-        return self._keep(self._session.liveliness().declare_subscriber(tokens, handler, history=True))
+        return self._keep(self._session.liveliness().declare_subscriber(self._names.alive("*"), handler, history=True))
 
     def close(self) -> None:
         """Close the session; everything it declared goes with it."""
@@ -152,7 +115,52 @@ class ZenohTransport:
             handle.close()
         self._session.close()
 
-    def _keep(self, entity: Any) -> _ZenohHandle:
-        handle = _ZenohHandle(entity)
+    def _show(self, kind: Endpoint, topic: Topic) -> tuple[str, Any]:
+        """Show an endpoint to ROS 2; return the key of its token and the token, or nothing where that is not done."""
+        if self._node is None:
+            return "", None
+        name = f"{self._node.namespace}/{topic.key}"
+        number, hashed = next(self._entities), type_hash(topic.ros_type)
+        key = self._node.endpoint_token(number, kind, name, topic.ros_type, hashed, OFFERED_QOS)
+        return key, self._session.liveliness().declare_token(key)
+
+    def _keep(self, *entities: Any) -> _ZenohHandle:
+        handle = _ZenohHandle(*entities)
         self._declared.append(handle)
         return handle
+
+
+def open_session(config: BridgeConfig, role: str) -> Any:
+    """Return a Zenoh session for `role`.
+
+    Raises:
+        TransportError: the endpoint of `role` is taken or malformed, or wants certificates where there are none.
+        KeysError: the certificates of `role` cannot be used.
+    """
+    settings = zenoh_settings(config, role, _credentials(config, role))
+    zenoh_config = zenoh.Config()
+    for path, value in settings.items():
+        zenoh_config.insert_json5(path, json.dumps(value))
+    try:
+        return zenoh.open(zenoh_config)
+    except zenoh.ZError as error:
+        endpoint = ", ".join(settings["listen/endpoints"]) or "none"
+        detail = str(error)
+        if "Address already in use" in detail or "os error 98" in detail:
+            key = "bridge.router.listen" if role == ROUTER else f"bridge.endpoints.{role}"
+            raise TransportError(
+                f"{role} cannot listen on {endpoint}: the port is in use (is another {role} running?); set {key}"
+            ) from error
+        raise TransportError(f"{role} cannot open the wire at {endpoint}: {detail.splitlines()[0]}") from error
+
+
+def _credentials(config: BridgeConfig, role: str) -> Credentials | None:
+    if config.keys:
+        credentials = load_credentials(Path(config.keys), identity_of(role))
+        for warning in credentials.warnings:
+            _LOG.warning("%s", warning)
+        return credentials
+    for endpoint in (*config.endpoints.values(), *config.connect, *config.router.listen, *config.router.connect):
+        if is_authenticated(endpoint):
+            raise TransportError(f"{endpoint} wants certificates: set bridge.keys, see surefoot keys --help")
+    return None

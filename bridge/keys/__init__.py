@@ -1,0 +1,1 @@
+"""Certificates of the roles: made, checked, shown."""
