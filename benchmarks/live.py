@@ -46,7 +46,10 @@ class Live:
         self._stack = ExitStack()
         folder = Path(self._stack.enter_context(TemporaryDirectory(prefix="surefoot-bench-")))
         write_walk(folder / "walk.npz", seconds)
-        own = [f"bridge.endpoints.{role}=tcp/127.0.0.1:{port}" for role, port in zip(ROLES, _free_ports(), strict=True)]
+        own = [
+            f"bridge.endpoints.{role}=tcp/127.0.0.1:{port}"
+            for role, port in zip(ROLES, free_ports(len(ROLES)), strict=True)
+        ]
         everything = [f"bridge.namespace=bench-{os.getpid()}", *own, *overrides]
         config = load_config(None, everything)
         transport = ZenohTransport(config.bridge, "bench", SystemClock())
@@ -134,8 +137,9 @@ def report(result: Mapping[str, Any], file: Path | None) -> None:
         file.write_text(text + "\n")
 
 
-def _free_ports() -> list[int]:
-    probes = [socket.socket() for _ in ROLES]
+def free_ports(count: int) -> list[int]:
+    """Return ports of this machine that nobody listens on."""
+    probes = [socket.socket() for _ in range(count)]
     for probe in probes:
         probe.bind(("127.0.0.1", 0))
     ports = [probe.getsockname()[1] for probe in probes]

@@ -55,6 +55,11 @@ _Twist = _T["geometry_msgs/msg/Twist"]
 _COVARIANCE = np.zeros(36)
 
 
+def prepare(topic: Topic) -> None:
+    """Have the codec of `topic` ready: rosbags writes and compiles it at first use, which takes tens of milliseconds."""
+    TYPES.get_msgdef(topic.ros_type)
+
+
 def encode(topic: Topic, message: Message) -> bytes:
     """Return `message` as the CDR bytes that `topic` carries."""
     return bytes(TYPES.serialize_cdr(_ENCODERS[topic.ros_type](message), topic.ros_type))

@@ -7,7 +7,7 @@ from collections import deque
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from bridge.clock import NS
-from bridge.codec import decode
+from bridge.codec import decode, prepare
 from bridge.errors import InvalidMessage
 from bridge.messages import Message
 from bridge.stuck import StuckWatch
@@ -60,6 +60,7 @@ class Inbox(Generic[M]):
         depth: int = 1,
         stuck_after_s: float = 0.0,
     ) -> None:
+        prepare(topic)
         self.topic = topic
         self.max_age_s = topic.max_age_s if max_age_s is None else max_age_s
         self._stuck = StuckWatch(topic.key, stuck_after_s)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from bridge.codec import encode
+from bridge.codec import encode, prepare
 from bridge.messages import Message
 from bridge.topics import Topic
 from bridge.transport.interface import Transport
@@ -15,6 +15,7 @@ class Outbox:
     """Numbers, encodes and sends the messages of one topic."""
 
     def __init__(self, transport: Transport, topic: Topic) -> None:
+        prepare(topic)
         self._topic = topic
         self._publisher = transport.publisher(topic)
         self._sequence = 0
