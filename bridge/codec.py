@@ -56,7 +56,7 @@ _COVARIANCE = np.zeros(36)
 
 
 def prepare(topic: Topic) -> None:
-    """Have the codec of `topic` ready: rosbags writes and compiles it at first use, which takes tens of milliseconds."""
+    """Have the codec of `topic` ready: rosbags writes and compiles it at first use, which takes tens of ms."""
     TYPES.get_msgdef(topic.ros_type)
 
 
@@ -96,6 +96,8 @@ def _header(stamp_ns: int, frame_id: str) -> Any:
 
 
 def _ns(stamp: Any) -> int:
+    if stamp.nanosec >= NS:
+        raise InvalidMessage(f"stamp has {stamp.nanosec} ns beside its seconds, limit {NS - 1}")
     return int(stamp.sec) * NS + int(stamp.nanosec)
 
 
