@@ -272,6 +272,8 @@ class SupportCommand:
         _require_finite("command velocity", self.velocity)
         _require_finite("command acceleration", self.acceleration)
         _require_finite("command column_height", self.column_height)
+        _require_finite("command damping or stiffness", self.damping)
+        _require_finite("command damping or stiffness", self.stiffness)
         _require_within("command stiffening", self.stiffening, 0.0, 1.0)
         _require_within("command lifetime_s", self.lifetime_s, 0.0, 1.0)
 

@@ -136,8 +136,6 @@ class SafetyGate:
             command.check()
         except InvalidMessage as error:
             return str(error)
-        if not (np.isfinite(command.damping).all() and np.isfinite(command.stiffness).all()):
-            return "command damping or stiffness is not finite"
         late = self._judge_time(command, now_ns) or self._judge_frame(command, now_ns)
         return late if late or not command.valid else self._judge_values(command)
 

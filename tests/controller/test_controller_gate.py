@@ -195,6 +195,7 @@ class TestTime:
         assert make_gate().filter(command(2 * NS, rests_on_ns=2 * NS - 250 * MS), 2 * NS).valid
         out = make_gate().filter(command(2 * NS, rests_on_ns=2 * NS - 251 * MS), 2 * NS)
         assert (out.valid, out.reason) == (False, "command rests on a camera frame 251 ms old, limit 250")
+        assert not make_gate().filter(command(2 * NS, rests_on_ns=2 * NS - 250 * MS - 1), 2 * NS).valid
         assert make_gate().filter(command(2 * NS, rests_on_ns=0), 2 * NS).valid, "a controller without a camera"
         stop = command(2 * NS, rests_on_ns=NS, valid=False, reason="because")
         assert make_gate().filter(stop, 2 * NS).reason == "because"
