@@ -36,6 +36,7 @@ def zenoh_settings(config: BridgeConfig, role: str, credentials: Credentials | N
         "connect/retry": {"period_init_ms": 100, "period_max_ms": 400, "period_increase_factor": 1.5},
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,
+        "open/return_conditions/connect_scouted": False,  # nobody is looked for, so nobody is waited for
         "timestamping/enabled": False,
         "transport/link/tx/lease": config.lease_ms,  # the default, 10 s, is how long rmw_zenoh misses a frozen peer
         "transport/link/tx/keep_alive": 4,

@@ -5,13 +5,21 @@ from __future__ import annotations
 import json
 import threading
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 import zenoh
-from bridge_idl import FallHorizonIdl, KeypointsIdl, SupportCommandIdl
-from bridge_recordings import START_NS, Event, command, horizon, keypoints, walk, write
+from bridge_idl import (
+    DiagnosticArrayIdl,
+    FallHorizonIdl,
+    KeypointsIdl,
+    OdometryIdl,
+    SupportCommandIdl,
+    TwistStampedIdl,
+    WrenchStampedIdl,
+)
+from bridge_recordings import START_NS, Event, walk, write
 from bridge_toys import free_ports
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
@@ -25,7 +33,7 @@ from bridge.config.bridge import BridgeConfig
 from bridge.outbox import Outbox
 from bridge.record.layout import header_stamp_ns
 from bridge.record.reader import Recording
-from bridge.topics import FALL_HORIZON, KEYPOINTS, SUPPORT_COMMAND, TOPICS
+from bridge.topics import TOPICS, Topic
 from bridge.transport.interface import Sample
 from bridge.transport.zenoh import ZenohTransport
 
@@ -119,49 +127,61 @@ def test_rosbags_reads_a_recording_with_the_definitions_inside(bag: Path) -> Non
     assert seen == COUNTS
 
 
-EXAMPLES = [
-    ("keypoints", KEYPOINTS, KeypointsIdl, keypoints(START_NS, 7)),
-    ("fall_horizon", FALL_HORIZON, FallHorizonIdl, horizon(START_NS, 8)),
-    ("support_command", SUPPORT_COMMAND, SupportCommandIdl, command(START_NS, 9)),
-]
+IDL: dict[str, Any] = {
+    "keypoints": KeypointsIdl,
+    "fall_horizon": FallHorizonIdl,
+    "wrench": WrenchStampedIdl,
+    "odom": OdometryIdl,
+    "support_command": SupportCommandIdl,
+    "cmd_vel": TwistStampedIdl,
+    "diagnostics": DiagnosticArrayIdl,
+}
+EVERY_TOPIC = pytest.mark.parametrize("topic", TOPICS, ids=[topic.key for topic in TOPICS])
 
 
-@pytest.mark.parametrize(("key", "topic", "idl", "message"), EXAMPLES, ids=[example[0] for example in EXAMPLES])
-def test_pycdr2_decodes_the_bytes_on_the_wire(
-    key: str, topic: Any, idl: Any, message: Any, wire_bytes: dict[str, bytes]
-) -> None:
-    raw = idl.deserialize(wire_bytes[key])
-    assert raw.header.stamp.sec * 10**9 + raw.header.stamp.nanosec == START_NS
-    assert (raw.header.frame_id, raw.sequence, raw.valid, raw.reason) == (message.frame_id, 0, True, "")
-    if key == "keypoints":
-        assert np.array_equal(np.reshape(raw.position_px, (12, 2)), message.position_px)
-        assert list(raw.status) == message.status.tolist()
-        assert (raw.body_length_px, raw.people) == (150.0, 1)
-    elif key == "fall_horizon":
-        assert np.array_equal(np.reshape(raw.forecast_px, (16, 12, 2)), message.forecast_px)
-        assert np.array_equal(np.reshape(raw.centre_distance, (16, 3)), message.centre_distance)
-        assert (raw.quality, raw.step_s) == (message.quality, message.step_s)
-    else:
-        assert (raw.state, raw.solver, raw.lifetime_s) == ("FOLLOW", "mpc", 0.06)
-        assert raw.rests_on.sec * 10**9 + raw.rests_on.nanosec == message.rests_on_ns
-        assert (raw.twist.linear.x, raw.twist.linear.z, raw.twist.angular.z) == (0.4, 0.0, 0.05)
-        assert list(raw.damping) == [30, 30, 10, 200]
-        assert np.isnan(raw.fall_distance)
+def test_there_is_a_foreign_definition_of_every_topic() -> None:
+    assert set(IDL) == {topic.key for topic in TOPICS}
 
 
-@pytest.mark.parametrize(("key", "topic", "idl", "message"), EXAMPLES, ids=[example[0] for example in EXAMPLES])
-def test_pycdr2_writes_the_same_bytes(key: str, topic: Any, idl: Any, message: Any) -> None:
-    payload = encode(topic, message)
-    again = idl.deserialize(payload).serialize()
+@EVERY_TOPIC
+def test_pycdr2_decodes_the_bytes_on_the_wire(topic: Topic, wire: dict[str, WireSample]) -> None:
+    check_values(f"/surefoot/{topic.key}", IDL[topic.key].deserialize(wire[f"surefoot/{topic.key}"].payload))
+
+
+def test_the_rest_of_a_command_too(wire: dict[str, WireSample]) -> None:
+    sent: Any = first("/surefoot/support_command").message
+    raw = SupportCommandIdl.deserialize(wire["surefoot/support_command"].payload)
+    assert (raw.sequence, raw.valid, raw.reason, raw.lifetime_s) == (0, True, "", 0.06)
+    assert list(raw.damping) == sent.damping.tolist()
+    assert list(raw.acceleration) == sent.acceleration.tolist()
+    assert np.isnan(raw.fall_distance)
+
+
+def test_keys_and_encoding_are_those_of_zenoh_bridge_ros2dds(wire: dict[str, WireSample]) -> None:
+    """The ROS 2 name without its leading slash; CDR named as such (zenoh-plugin-ros2dds)."""
+    assert set(wire) == {name.lstrip("/") for name in TYPES}
+    assert {sample.encoding for sample in wire.values()} == {"application/cdr"}
+    assert all(sample.payload[:4] == b"\x00\x01\x00\x00" for sample in wire.values()), "little-endian plain CDR"
+
+
+@EVERY_TOPIC
+def test_pycdr2_writes_the_same_bytes(topic: Topic) -> None:
+    payload = encode(topic, first(f"/surefoot/{topic.key}").message)
+    again = IDL[topic.key].deserialize(payload).serialize()
     padding = len(payload) - len(again)  # a trailing alignment is the writer's choice
     assert abs(padding) < 4
     shorter = min(len(payload), len(again))
     assert again[4:shorter] == payload[4:shorter]
 
 
+class WireSample(NamedTuple):
+    payload: bytes
+    encoding: str
+
+
 @pytest.fixture(scope="module")
-def wire_bytes() -> dict[str, bytes]:
-    """What a Zenoh subscriber of its own, without any of Surefoot's reading code, receives of each message."""
+def wire() -> dict[str, WireSample]:
+    """What a Zenoh subscriber of its own, without any of Surefoot's reading code, receives of each topic."""
     port = free_ports(1)[0]
     config = BridgeConfig(endpoints={"perception": f"tcp/127.0.0.1:{port}"})
     settings = zenoh.Config()
@@ -172,21 +192,21 @@ def wire_bytes() -> dict[str, bytes]:
     }.items():
         settings.insert_json5(path, json.dumps(value))
     transport = ZenohTransport(config, "perception", SystemClock())
-    got: dict[str, bytes] = {}
+    got: dict[str, WireSample] = {}
     complete = threading.Event()
 
     def receive(sample: Any) -> None:
-        got[str(sample.key_expr).rpartition("/")[2]] = sample.payload.to_bytes()
-        if len(got) == len(EXAMPLES):
+        got[str(sample.key_expr)] = WireSample(sample.payload.to_bytes(), str(sample.encoding))
+        if len(got) == len(TOPICS):
             complete.set()
 
     session = zenoh.open(settings)
     subscriber = session.declare_subscriber("surefoot/*", zenoh.handlers.Callback(receive, indirect=False))
     try:
         for _ in range(300):  # until the subscriber is known to the publishers
-            for _, topic, _, message in EXAMPLES:
+            for topic in TOPICS:
                 outbox = Outbox(transport, topic)
-                outbox.send(message)
+                outbox.send(first(f"/surefoot/{topic.key}").message)
                 outbox.close()
             if complete.wait(0.1):
                 return got

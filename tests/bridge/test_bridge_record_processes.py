@@ -10,6 +10,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -33,11 +34,11 @@ ROLES = ("perception", "anticipation", "controller", "drive")
 class Publishers:
     """Perception and drive, each a session of its own, publishing from a thread until closed."""
 
-    def __init__(self) -> None:
+    def __init__(self, naming: Literal["ros2dds", "rmw_zenoh"] = "ros2dds") -> None:
         self.endpoints = {
             role: f"tcp/127.0.0.1:{port}" for role, port in zip(ROLES, free_ports(len(ROLES)), strict=True)
         }
-        self.config = BridgeConfig(endpoints=self.endpoints)
+        self.config = BridgeConfig(endpoints=self.endpoints, naming=naming)
         clock = SystemClock()
         self._transports = [ZenohTransport(self.config, role, clock) for role in ("perception", "drive")]
         self._keypoints = Outbox(self._transports[0], KEYPOINTS)
@@ -66,13 +67,13 @@ class Publishers:
             transport.close()
 
     def settings(self) -> list[str]:
-        pairs = (f"bridge.endpoints.{role}={endpoint}" for role, endpoint in self.endpoints.items())
-        return [word for pair in pairs for word in ("--set", pair)]
+        pairs = [f"bridge.endpoints.{role}={endpoint}" for role, endpoint in self.endpoints.items()]
+        return [word for pair in [*pairs, f"bridge.naming={self.config.naming}"] for word in ("--set", pair)]
 
 
 @pytest.fixture
-def publishers() -> Iterator[Publishers]:
-    with closing(Publishers()) as made:
+def publishers(request: pytest.FixtureRequest) -> Iterator[Publishers]:
+    with closing(Publishers(getattr(request, "param", "ros2dds"))) as made:
         yield made
 
 
@@ -150,6 +151,7 @@ def test_killed_when_all_is_quiet_nothing_is_missing(publishers: Publishers, tmp
     assert "cut off" in recording.damage
 
 
+@pytest.mark.parametrize("publishers", ["ros2dds", "rmw_zenoh"], indirect=True)
 def test_interrupted_it_finishes_the_file(publishers: Publishers, tmp_path: Path) -> None:
     out = tmp_path / "walk"
     with Surefoot(publishers, out) as surefoot:

@@ -185,11 +185,15 @@ def test_garbage_is_replayed_as_garbage(payload: bytes) -> None:
 
 
 @pytest.fixture
-def wire() -> BridgeConfig:
+def wire(request: pytest.FixtureRequest) -> BridgeConfig:
     roles = ("perception", "anticipation", "controller", "drive")
     return BridgeConfig(
-        endpoints={role: f"tcp/127.0.0.1:{port}" for role, port in zip(roles, free_ports(len(roles)), strict=True)}
+        endpoints={role: f"tcp/127.0.0.1:{port}" for role, port in zip(roles, free_ports(len(roles)), strict=True)},
+        naming=getattr(request, "param", "ros2dds"),
     )
+
+
+both_namings = pytest.mark.parametrize("wire", ["ros2dds", "rmw_zenoh"], indirect=True)
 
 
 @pytest.fixture
@@ -201,6 +205,7 @@ def viewer(wire: BridgeConfig) -> Iterator[dict[str, list[Sample]]]:
         yield got
 
 
+@both_namings
 def test_the_whole_system_goes_over_the_wire_again(
     tmp_path: Path, wire: BridgeConfig, viewer: dict[str, list[Sample]]
 ) -> None:
@@ -251,10 +256,12 @@ def test_a_replay_ends_when_it_is_told_to(tmp_path: Path, wire: BridgeConfig) ->
     assert sum(played.sent.values()) < 20
 
 
+@both_namings
 @pytest.mark.processes
 def test_a_process_is_fed_and_its_answers_are_kept(tmp_path: Path, wire: BridgeConfig) -> None:
     path = write(tmp_path / "walk.mcap", walk(1.5))
     endpoints = [f"bridge.endpoints.{role}={endpoint}" for role, endpoint in wire.endpoints.items()]
+    endpoints.append(f"bridge.naming={wire.naming}")
     arguments = ["--only", "controller", "--option", "controller=log", "--delay", "0.5", "--out", tmp_path / "out.mcap"]
     assert run("replay", path, *arguments, *(word for pair in endpoints for word in ("--set", pair))) == 0
     commands = [message for _, message, _ in Recording(tmp_path / "out.mcap").messages([SUPPORT_COMMAND])]

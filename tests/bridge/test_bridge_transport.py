@@ -11,6 +11,7 @@ import textwrap
 import threading
 import time
 from collections.abc import Callable, Iterator
+from typing import Literal, TypeAlias
 
 import pytest
 
@@ -24,6 +25,8 @@ from bridge.transport.interface import Sample, Transport
 from bridge.transport.memory import MemoryHub
 from bridge.transport.zenoh import ZenohTransport
 
+Naming: TypeAlias = Literal["ros2dds", "rmw_zenoh"]
+
 
 def free_port() -> int:
     with socket.socket() as probe:
@@ -31,9 +34,9 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def bridge_config() -> BridgeConfig:
+def bridge_config(naming: Naming = "ros2dds") -> BridgeConfig:
     ports = {role: f"tcp/127.0.0.1:{free_port()}" for role in ("perception", "anticipation", "controller", "drive")}
-    return BridgeConfig(endpoints=ports)
+    return BridgeConfig(endpoints=ports, naming=naming)
 
 
 def until(condition: Callable[[], bool], timeout_s: float = 15.0) -> bool:
@@ -45,14 +48,14 @@ def until(condition: Callable[[], bool], timeout_s: float = 15.0) -> bool:
     return condition()
 
 
-@pytest.fixture(params=["memory", "zenoh"])
+@pytest.fixture(params=["memory", "ros2dds", "rmw_zenoh"])
 def pair(request: pytest.FixtureRequest) -> Iterator[tuple[Transport, Transport]]:
     clock = SystemClock()
     if request.param == "memory":
         hub = MemoryHub(clock)
         one, two = hub.transport(), hub.transport()
     else:
-        config = bridge_config()
+        config = bridge_config(request.param)
         one, two = ZenohTransport(config, "drive", clock), ZenohTransport(config, "controller", clock)
     yield one, two
     one.close()
