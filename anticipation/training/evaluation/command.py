@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from enum import StrEnum
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,14 +13,22 @@ from rich.console import Console
 
 from anticipation.training.clips import data_folder
 from anticipation.training.corpus import read_corpus
-from anticipation.training.evaluation import protocols, records
-from anticipation.training.evaluation.protocols import Study
+from anticipation.training.evaluation import records
+from anticipation.training.evaluation.protocols import Study, cross, grouped, observed, paper
 from anticipation.training.evaluation.recordings import read_recordings
 from anticipation.training.evaluation.records import Predictions
 from anticipation.training.evaluation.results import results_of
 from anticipation.training.networks import progress_bars
 from anticipation.training.plan import plan_for
 from anticipation.training.report.console import show
+from anticipation.training.report.folder import (
+    predictions_path,
+    read_experiment,
+    render,
+    stored_predictions,
+    write_json,
+)
+from anticipation.training.report.page import PAGE
 from bridge.config.load import load_config
 from bridge.errors import SurefootError
 
@@ -82,48 +89,59 @@ def evaluate(
     settings: Annotated[
         list[str] | None, typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Override one value; repeatable.")
     ] = None,
+    experiments: Annotated[
+        list[Path] | None,
+        typer.Option("--experiment", metavar="FILE.json", help="Table measured apart, for the page; repeatable."),
+    ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="A few small fits, to see that everything runs.")] = False,
 ) -> None:
     """Measure how well recordings are foreseen that no network has seen.
 
+    Prints the main tables. With --report, writes page, pictures, numbers (PROTOCOL.json), what the networks said of
+    every clip (PROTOCOL.npz) and the networks; several protocols may share a folder, and one page shows them all.
+
     Example: surefoot evaluate --protocol grouped --report runs/report
+
+    Draw again, without training: surefoot evaluate --from runs/report --report runs/report
     """
     parsed = load_config(config, settings or [])
-    if json_file is not None:
-        _writable(json_file)
+    told = [read_experiment(path) for path in experiments or []]
+    for path in (json_file, None if report is None else report / PAGE):
+        if path is not None:
+            _writable(path)
     torch.set_num_threads(1)  # more give other sums, and on a busy machine no speed
-    if stored is not None:
-        made = records.load(_predictions(stored, protocol))
-    else:
-        folder = data_folder(data)
-        with TemporaryDirectory() as scratch, progress_bars() as progress:
-            place = Path(scratch) if report is None else report
-            place.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory() as scratch, progress_bars() as progress:
+        place = stored or report or Path(scratch)
+
+        def study(seed: int, keypoints: str) -> Study:
             plan = plan_for(forecaster.value, seed, quick, epochs)
+            folder = data_folder(data)
             corpus = read_corpus(folder, plan.mocap_clips, seed, parsed.perception.cleaning)
             filmed = read_recordings(folder, corpus, plan.mocap_clips, seed)
-            study = Study(
-                corpus, filmed, plan, seed, place, parsed, progress, keypoints.value, baselines, live is not False
-            )
-            made = _run(study, protocol, folds)
-            if report is not None:
-                records.save(made, _predictions(report, protocol))
+            return Study(corpus, filmed, plan, seed, place, parsed, progress, keypoints, baselines, live is not False)
+
+        if stored is None:
+            made = _run(study(seed, keypoints.value), protocol, folds)
+        else:
+            made = stored_predictions(stored, protocol.value)
+            if live:
+                made = observed(made, study(int(made.meta["seed"]), str(made.meta["keypoints"])))
+        if live if stored is not None else report is not None:
+            records.save(made, predictions_path(place, protocol.value))
     results = results_of(made)
     show(results, Console() if Console().is_terminal else Console(width=140))
     if json_file is not None:
-        json_file.write_text(json.dumps(results, indent=1) + "\n")
-
-
-def _predictions(folder: Path, protocol: Protocol) -> Path:
-    return folder / f"{protocol.value}.npz"
+        write_json(results, json_file)
+    if report is not None:
+        Console(stderr=True).print(f"report: {render(place, report, told)}")
 
 
 def _run(study: Study, protocol: Protocol, folds: int) -> Predictions:
     if protocol is Protocol.GROUPED:
-        return protocols.grouped(study, folds)
+        return grouped(study, folds)
     if protocol is Protocol.PAPER:
-        return protocols.paper(study)
-    return protocols.cross(study)
+        return paper(study)
+    return cross(study)
 
 
 def _writable(path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from anticipation.training.clips import UNLABELLED
+from anticipation.training.clips import FALL, UNLABELLED
 from anticipation.training.evaluation.calibration import (
     Said,
     cross_fitted,
@@ -17,6 +17,8 @@ from anticipation.training.evaluation.calibration import (
     said,
     tempered,
 )
+from anticipation.training.evaluation.events import calm, fall_of, together
+from anticipation.training.evaluation.onset import dataset_onset, physical_labels, physical_onset
 from anticipation.training.evaluation.records import Predictions, Record
 from anticipation.training.evaluation.scores import (
     SHIPPED,
@@ -31,6 +33,7 @@ from anticipation.training.evaluation.scores import (
     macro_f1,
     mean_error,
 )
+from anticipation.training.evaluation.transient import descents
 from anticipation.training.measures import STEPS as TABLE_STEPS
 from bridge.messages import STEP_S, STEPS, Floats
 
@@ -39,54 +42,128 @@ ENDS: Final = (TABLE_STEPS[0], TABLE_STEPS[-1])  # present and half a second: wh
 
 
 def results_of(predictions: Predictions) -> dict[str, Any]:
-    """Return all numbers that follow from stored predictions."""
+    """Return all numbers that follow from stored predictions; what is not known is None."""
     keypoints = str(predictions.meta["keypoints"])
     falls = predictions.of("fall", estimator="" if keypoints == "both" else keypoints)
-    tables: dict[str, Any] = {"urfd": _table(falls)}
+    ticked = [record for record in falls if record.ticks is not None]
     others = [record for record in predictions.of("fall") if record not in falls and record.ticks is not None]
-    if others:
-        tables["urfd_other_tracks"] = _table(others)
     staged = [record for record in predictions.of("staged") if record.ticks is not None]
-    if staged:
-        tables["upfall"] = _table(staged)
-    if falls:
-        tables["urfd_every_horizon"] = _table(falls, every_tick=True)
-    return {
+    tables = {
+        "urfd": _table(ticked),
+        "urfd_every_horizon": _table(ticked, every_tick=True),
+        "urfd_other_tracks": _table(others),
+        "upfall": _table(staged),
+        "urfd_physical": _table(ticked, physical_labels),
+        "upfall_physical": _table(staged, physical_labels),
+    }
+    results = {
         "format": FORMAT,
         **{name: predictions.meta[name] for name in ("protocol", "seed", "parts", "keypoints", "forecaster")},
         "shipped": SHIPPED,
         "horizons_ms": [_ms(step) for step in TABLE_STEPS],
         "error_horizons_ms": [_ms(step) for step in range(1, STEPS)],
-        "tables": tables,
-        "forecast_error": _forecast_error(falls) if falls else {},
-        **_calibration(predictions, falls, keypoints),
+        "tables": {name: table for name, table in tables.items() if table},
+        "forecast_error": _forecast_error(ticked) if ticked else {},
+        **_calibration(predictions, ticked, keypoints),
+        "onset": {"urfd": _onsets(ticked), "upfall": _onsets(staged)},
+        "transient": [each._asdict() for each in descents(predictions, ticked)],
+        **_whole_system(predictions, falls),
     }
+    plain: dict[str, Any] = _plain(results)
+    return plain
+
+
+def _onsets(records: Sequence[Record]) -> dict[str, Any]:
+    """Compare the data set's onset with the physical one: times before lying, and labels tick by tick.
+
+    `agreement` is the share of tested ticks on which both call the person the same: the accuracy that a perfect
+    predictor of one would have under the other.
+    """
+    clips, same, ticks_seen = [], 0, 0
+    for record in records:
+        ticks = record.ticks
+        assert ticks is not None
+        lying, found = np.flatnonzero(ticks.labels == FALL), physical_onset(ticks)
+        begun = dataset_onset(ticks.labels)
+        if not len(lying) or begun is None:
+            continue
+        clips.append(
+            {
+                "name": record.name,
+                "dataset_s": (int(lying[0]) - begun) * STEP_S,
+                "physical_s": None if found is None else (int(lying[0]) - found) * STEP_S,
+            }
+        )
+        one, other = ticks.labels, physical_labels(record)
+        there = ticks.tested & ticks.valid & (one >= 0) & (other >= 0)
+        same += int((one[there] == other[there]).sum())
+        ticks_seen += int(there.sum())
+    return {"clips": clips, "ticks": ticks_seen, "agreement": same / ticks_seen if ticks_seen else None}
+
+
+def _whole_system(predictions: Predictions, falls: Sequence[Record]) -> dict[str, Any]:
+    """Events and interventions of the live pass; empty if there was none."""
+    staged = predictions.of("staged")
+    found = {
+        "urfd": [fall for fall in map(fall_of, falls) if fall],
+        "upfall": [fall for fall in map(fall_of, staged) if fall],
+    }
+    everything = [fall for each in found.values() for fall in each]
+    if not everything and not calm(predictions.records):
+        return {}
+    activities = calm(predictions.records)
+    return {
+        "events": {
+            **{name: together(each)._asdict() for name, each in found.items()},
+            "all": together(everything)._asdict(),
+            "falls": [fall._asdict() for fall in everything],
+        },
+        "daily": [each._asdict() for each in activities],
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Return what JSON can say: numbers that are not finite become None."""
+    if isinstance(value, Mapping):
+        return {name: _plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, float | np.floating):
+        return round(float(value), 4) if np.isfinite(value) else None
+    return value
 
 
 def _table(records: Sequence[Record], relabel: Relabel = dataset_labels, every_tick: bool = False) -> dict[str, Any]:
     """Accuracy, macro-F1 and confusion of some records, part by part."""
     parts = judged(records, relabel, every_tick)
-    names = list(next(iter(parts.values())).said) if parts else []
+    if not parts:
+        return {}
+    names = list(next(iter(parts.values())).said)
     tested = sum(int((each.truth[:, 0] >= 0).sum()) for each in parts.values())
-    labelled = sum(int((relabel(record) != UNLABELLED).sum()) for record in records if record.ticks is not None)
+    labelled = sum(int((relabel(record) != UNLABELLED).sum()) for record in records)
+    pooled = Judged(
+        np.concatenate([each.truth for each in parts.values()]),
+        {name: np.concatenate([each.said[name] for each in parts.values()]) for name in names},
+    )
+    scores = {"accuracy": accuracy, "macro_f1": macro_f1}
     return {
         "parts": list(parts),
-        "clips": sum(record.ticks is not None for record in records),
+        "clips": len(records),
         "tested_frames": tested,
         "excluded_frames": labelled - tested,
-        "accuracy": {name: [by_step(each, name, accuracy, TABLE_STEPS) for each in parts.values()] for name in names},
-        "macro_f1": {name: [by_step(each, name, macro_f1, TABLE_STEPS) for each in parts.values()] for name in names},
-        "confusion": {str(_ms(step)): _confusion(parts, step) for step in ENDS},
+        **{
+            kind: {name: [by_step(each, name, score, TABLE_STEPS) for each in parts.values()] for name in names}
+            for kind, score in scores.items()
+        },
+        "pooled": {
+            kind: {name: by_step(pooled, name, score, TABLE_STEPS) for name in names} for kind, score in scores.items()
+        },
+        "confusion": {
+            str(_ms(step)): confusion(pooled.truth[:, step], pooled.said[SHIPPED][:, step]).tolist() for step in ENDS
+        },
     }
-
-
-def _confusion(parts: Mapping[int, Judged], step: int) -> list[list[int]]:
-    total = sum(
-        (confusion(each.truth[:, step], each.said[SHIPPED][:, step]) for each in parts.values()),
-        start=np.zeros((3, 3), dtype=np.int64),
-    )
-    counts: list[list[int]] = total.tolist()
-    return counts
 
 
 def _forecast_error(falls: Sequence[Record]) -> dict[str, Any]:
