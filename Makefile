@@ -26,7 +26,7 @@ format: $(VENV)/.dev
 bench: $(VENV)/.dev
 	$(BIN)/python -m benchmarks.mpc --json runs/bench/mpc.json
 	$(BIN)/python -m benchmarks.anticipation --json runs/bench/anticipation.json
-	$(BIN)/python -m benchmarks.latency --json runs/bench/latency.json
+	$(BIN)/surefoot latency --json runs/bench/latency.json
 
 clean:
 	rm -rf $(VENV) runs build *.egg-info

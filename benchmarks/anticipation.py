@@ -29,7 +29,7 @@ from anticipation.motion import DctMlpForecaster, LstmForecaster
 from anticipation.predictor import Predictor
 from anticipation.quality import PoseStatistics
 from anticipation.transient import TransientPlane
-from benchmarks.live import machine, percentiles
+from benchmarks.report import machine, percentiles
 from bridge.clock import NS
 from bridge.config.anticipation import AnticipationConfig
 from bridge.config.perception import CleaningConfig

@@ -21,12 +21,13 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.live import free_ports, machine, report
+from benchmarks.report import machine, report
 from bridge.clock import NS, SystemClock
 from bridge.config.load import load_config
 from bridge.inbox import Inbox
 from bridge.launch.launcher import Launcher
 from bridge.launch.observer import Tap
+from bridge.launch.ports import free_ports
 from bridge.messages import STEPS, FallHorizon, NodeStatus, SupportCommand
 from bridge.outbox import Outbox
 from bridge.topics import DIAGNOSTICS, FALL_HORIZON, SUPPORT_COMMAND

@@ -20,7 +20,7 @@ import numpy as np
 import osqp
 from scipy import sparse
 
-from benchmarks.live import machine, percentiles
+from benchmarks.report import machine, percentiles
 from bridge.clock import NS
 from bridge.config.admittance import AdmittanceConfig
 from bridge.config.mpc import MpcConfig

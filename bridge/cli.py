@@ -35,6 +35,7 @@ COMMANDS: Final = {
     "config": Command("bridge.config.command:config", "Print a configuration file with every key and its meaning."),
     "demo": Command("bridge.launch.demo:demo", "Run it all on a generated stumble; print a timeline, draw a picture."),
     "assess": Command("bridge.assess.command:assess", "Assess keypoint clips offline with the code that runs live."),
+    "latency": Command("bridge.latency.command:latency", "Measure newest frame to command on the wire, hop by hop."),
     "record": Command("bridge.record.record_command:record", "Record what is on the wire into an MCAP file."),
     "info": Command("bridge.record.info_command:info", "Say what is in a recording, also one that was cut off."),
     "replay": Command("bridge.record.replay_command:replay", "Replay a recording to everyone or to one process."),

@@ -23,8 +23,8 @@ from benchmarks.faults.judge import (
 )
 from benchmarks.faults.stream_rows import AFTER_S, BEFORE_S, LIMIT_MS, disturbed, speeding_up, timed
 from benchmarks.faults.system import DirectSystem
-from benchmarks.live import ROLES
 from bridge.clock import nanoseconds
+from bridge.latency.system import ROLES
 from bridge.messages import GaitState
 from bridge.topics import FALL_HORIZON, KEYPOINTS, ODOMETRY, SUPPORT_COMMAND, WRENCH, Topic
 from controller.gate import GateLimits

@@ -32,7 +32,13 @@ NAMES: Final = {
     "odometry": ODOMETRY,
     "command": SUPPORT_COMMAND,
 }
-WORDS: Final = {"keypoints": "keypoint", "horizon": "horizon", "wrench": "wrench", "odometry": "odom", "command": ""}
+WORDS: Final = {
+    "keypoints": "keypoint",
+    "horizon": "horizon",
+    "wrench": "wrench",
+    "odometry": "odom",
+    "command": "command",
+}
 BEFORE_S: Final = 0.3
 AFTER_S: Final = 0.3
 BACK_LIMIT_S: Final = 5.0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
@@ -13,12 +12,13 @@ from tempfile import TemporaryDirectory
 from typing import Any, Final, Self
 
 from benchmarks.faults.relay import READERS, Relay
-from benchmarks.live import ROLES, write_walk
 from bridge.clock import SystemClock
 from bridge.codec import decode
 from bridge.config.load import load_config
 from bridge.errors import InvalidMessage
+from bridge.latency.system import ROLES, write_walk
 from bridge.launch.launcher import Launcher, Phase, ProcessState
+from bridge.launch.ports import free_ports
 from bridge.messages import GaitState, Message, NodeStatus, Odometry, SupportCommand
 from bridge.topics import DIAGNOSTICS, ODOMETRY, SUPPORT_COMMAND, Topic
 from bridge.transport.interface import Sample
@@ -230,14 +230,3 @@ class DirectSystem(System):
             while waiting:
                 sample = waiting.pop(0)
                 self.hear(topic, sample.arrival_ns, sample.payload, sample.sequence, sample.source)
-
-
-def free_ports(count: int) -> list[int]:
-    """Return ports nobody listens on."""
-    probes = [socket.socket() for _ in range(count)]
-    for probe in probes:
-        probe.bind(("127.0.0.1", 0))
-    ports = [probe.getsockname()[1] for probe in probes]
-    for probe in probes:
-        probe.close()
-    return ports

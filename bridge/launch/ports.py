@@ -31,6 +31,17 @@ def require_free(endpoints: Mapping[str, str], roles: Iterable[str]) -> None:
             )
 
 
+def free_ports(count: int) -> list[int]:
+    """Return TCP ports of the loopback that nobody listens on at the moment."""
+    probes = [socket.socket() for _ in range(count)]
+    for probe in probes:
+        probe.bind(("127.0.0.1", 0))
+    ports = [probe.getsockname()[1] for probe in probes]
+    for probe in probes:
+        probe.close()
+    return ports
+
+
 def _is_free(endpoint: str) -> bool:
     """Whether nobody listens on `endpoint`; what else may be wrong with it is for the role to say."""
     protocol, _, address = endpoint.partition("/")

@@ -44,6 +44,7 @@ class DriveNode:
         self._now_ns = 0
         self._executed: SupportCommand | None = None
         self._age_s = math.inf
+        self._fault = ""  # what is wrong with what arrives as commands
 
     @property
     def period_s(self) -> float | None:
@@ -61,7 +62,7 @@ class DriveNode:
             vx, vy, yaw_rate, column = self._executed.velocity.tolist()
             self._state = self._model.advance(self._state, (vx, vy, yaw_rate, column), dt)
         reading = self._commands.read(now_ns)
-        self._age_s = reading.age_s
+        self._age_s, self._fault = reading.age_s, reading.fault
         # the inbox keeps the newest command even when it is stale: the gate lets it expire and says so
         self._executed = self._gate.filter(reading.message, now_ns)
         self._odometry.send(_odometry(self._state, now_ns))
@@ -94,7 +95,8 @@ class DriveNode:
             "gate_refused": str(self._gate.refused),
         }
         rival = self._commands.rival(now_ns)
-        summary = ("follows commands" if moving else f"holds: {reason}") + (f" ({rival})" if rival else "")
+        notes = "; ".join(filter(None, ("" if moving else self._fault, rival)))
+        summary = ("follows commands" if moving else f"holds: {reason}") + (f" ({notes})" if notes else "")
         level = 0 if moving and not rival else 1
         return NodeStatus(stamp_ns=now_ns, role="drive", level=level, summary=summary, values=values)
 

@@ -1,31 +1,33 @@
-"""The real processes on a wire of their own, with an observer that keeps every command and horizon."""
+"""The real processes on a wire of their own, with an observer that keeps every message on the way to a command."""
 
 from __future__ import annotations
 
-import json
 import os
-import socket
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Self
+from typing import Any, Final, Self
 
 import numpy as np
 
 from bridge.clock import SystemClock
 from bridge.config.load import load_config
+from bridge.errors import SurefootError
+from bridge.latency.hops import Heard
 from bridge.launch.launcher import Launcher, ProcessState
 from bridge.launch.monitor import Monitor, View
 from bridge.launch.observer import Tap
+from bridge.launch.ports import free_ports
 from bridge.messages import FallHorizon, Keypoints, SupportCommand
 from bridge.topics import FALL_HORIZON, KEYPOINTS, SUPPORT_COMMAND
 from bridge.transport.zenoh import ZenohTransport
 
-ROLES = ("perception", "anticipation", "controller", "drive")
-CLIP = "walk-stumble-fall"
+ROLES: Final = ("perception", "anticipation", "controller", "drive")
+CLIP: Final = "walk-stumble-fall"
+POLL_S: Final = 0.005
 
 
 def write_walk(path: Path, seconds: float) -> None:
@@ -39,30 +41,54 @@ def write_walk(path: Path, seconds: float) -> None:
     np.savez(path, **{"walk/keypoints": there_and_back[frames], "walk/fps": fps, "walk/image_size": size})
 
 
-class Live:
-    """Perception, anticipation, controller and drive as `surefoot up` runs them, on free ports."""
+class LiveSystem:
+    """Perception, anticipation, controller and drive as `surefoot up` runs them, on free ports.
 
-    def __init__(self, seconds: float, controller: str, overrides: Sequence[str] = ()) -> None:
+    Perception plays a generated walk, so no pose estimator is part of it.
+    """
+
+    def __init__(
+        self, seconds: float, config: Path | None = None, overrides: Sequence[str] = (), controller: str | None = None
+    ) -> None:
+        """Prepare, but start nothing.
+
+        Args:
+            seconds: how much there is to walk [s].
+            config: TOML file; None means the defaults.
+            overrides: `section.key=value` on top of it.
+            controller: mpc or log; None: what the configuration says.
+
+        Raises:
+            ConfigError: the configuration does not hold.
+        """
         self._stack = ExitStack()
-        folder = Path(self._stack.enter_context(TemporaryDirectory(prefix="surefoot-bench-")))
+        folder = Path(self._stack.enter_context(TemporaryDirectory(prefix="surefoot-latency-")))
         write_walk(folder / "walk.npz", seconds)
-        own = [
-            f"bridge.endpoints.{role}=tcp/127.0.0.1:{port}"
-            for role, port in zip(ROLES, free_ports(len(ROLES)), strict=True)
-        ]
-        everything = [f"bridge.namespace=bench-{os.getpid()}", *own, *overrides]
-        config = load_config(None, everything)
-        transport = ZenohTransport(config.bridge, "bench", SystemClock())
+        ports = zip(ROLES, free_ports(len(ROLES)), strict=True)
+        own = [f"bridge.endpoints.{role}=tcp/127.0.0.1:{port}" for role, port in ports]
+        everything = [f"bridge.namespace=latency-{os.getpid()}", *own, *overrides]
+        loaded = load_config(config, everything)
+        transport = ZenohTransport(loaded.bridge, "observer", SystemClock())
         self._stack.callback(transport.close)
         self._monitor = Monitor(transport, SystemClock())
         self._taps = {topic.key: Tap(transport, topic) for topic in (KEYPOINTS, FALL_HORIZON, SUPPORT_COMMAND)}
         self.keypoints: list[tuple[Keypoints, int]] = []  # each with its arrival [ns]
         self.horizons: list[tuple[FallHorizon, int]] = []
         self.commands: list[tuple[SupportCommand, int]] = []
-        options = {"perception": {"source": f"{folder / 'walk.npz'}:walk"}, "controller": {"controller": controller}}
-        self.launcher = self._stack.enter_context(Launcher(config, None, everything, options))
+        options = {"perception": {"source": f"{folder / 'walk.npz'}:walk"}}
+        if controller is not None:
+            options["controller"] = {"controller": controller}
+        self.launcher = self._stack.enter_context(Launcher(loaded, config, everything, options))
         self.processes: Mapping[str, ProcessState] = {}
         self.view: View = self._monitor.look()
+
+    def heard_since(self, since_ns: int) -> Heard:
+        """Return what rests on frames and was computed after `since_ns`."""
+        return Heard(
+            [(m, t) for m, t in self.keypoints if m.stamp_ns >= since_ns],
+            [(m, t) for m, t in self.horizons if m.stamp_ns >= since_ns],
+            [(m, t) for m, t in self.commands if m.stamp_ns >= since_ns],
+        )
 
     def look(self) -> None:
         """Take in what arrived and how the processes are."""
@@ -79,22 +105,26 @@ class Live:
         """Look until `condition` holds.
 
         Raises:
-            SystemExit: it does not within `limit_s`, or a process ended that should run.
+            SurefootError: it does not within `limit_s`.
         """
         deadline_s = time.monotonic() + limit_s
         while not condition():
             self.look()
             if time.monotonic() > deadline_s:
                 states = "; ".join(f"{p.role} {p.phase} {p.last_line}" for p in self.processes.values())
-                raise SystemExit(f"{what}: not within {limit_s:g} s ({states})")
-            time.sleep(0.005)
+                raise SurefootError(f"{what}: not within {limit_s:g} s ({states})")
+            time.sleep(POLL_S)
 
     def alive(self, *roles: str) -> bool:
         """Whether every one of `roles` is there, by its liveliness token."""
         return all(role in self.view.roles and self.view.roles[role].alive for role in roles)
 
     def start(self) -> None:
-        """Start everything, perception last, and wait until a command moves on real horizons."""
+        """Start everything, perception last, and wait until a command moves on real horizons.
+
+        Raises:
+            SurefootError: none does.
+        """
         self.launcher.start(role for role in ROLES if role != "perception")
         self.until(lambda: self.alive(*ROLES[1:]), "start of the processes")
         self.launcher.start(["perception"])
@@ -110,39 +140,3 @@ class Live:
 
     def __exit__(self, *error: object) -> None:
         self._stack.close()
-
-
-def percentiles(values_ms: Sequence[float]) -> dict[str, float]:
-    """Return count, median, 99th percentile and maximum."""
-    p50, p99 = np.percentile(values_ms, [50, 99])
-    return {
-        "count": len(values_ms),
-        "p50_ms": round(float(p50), 3),
-        "p99_ms": round(float(p99), 3),
-        "max_ms": round(max(values_ms), 3),
-    }
-
-
-def machine() -> dict[str, Any]:
-    """Return what numbers of time depend on."""
-    return {"cores": os.cpu_count(), "load_1min": round(os.getloadavg()[0], 2)}
-
-
-def report(result: Mapping[str, Any], file: Path | None) -> None:
-    """Print `result`, and write it to `file` where one is named."""
-    text = json.dumps(result, indent=2)
-    print(text)
-    if file is not None:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text + "\n")
-
-
-def free_ports(count: int) -> list[int]:
-    """Return ports of this machine that nobody listens on."""
-    probes = [socket.socket() for _ in range(count)]
-    for probe in probes:
-        probe.bind(("127.0.0.1", 0))
-    ports = [probe.getsockname()[1] for probe in probes]
-    for probe in probes:
-        probe.close()
-    return ports
