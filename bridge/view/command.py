@@ -106,6 +106,8 @@ def view(
                 typer.echo(f"{found.path}: not whole: {found.damage}", err=True)
             while viewers and not ended():
                 time.sleep(WAIT_S)
+        for one in viewers:
+            one.require_well()
     if save is not None:
         typer.echo(f"{save}: {save.stat().st_size / 1e6:.2f} MB", err=True)
     return 0

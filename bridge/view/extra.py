@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,11 +19,13 @@ class Rerun(NamedTuple):
 
 
 def load_rerun() -> Rerun:
-    """Import Rerun.
+    """Import Rerun, silent: what goes wrong with a viewer or a file is found out and said here.
 
     Raises:
         MissingExtraError: it is not installed.
     """
+    said = os.environ.get("RUST_LOG")  # read once, at the import
+    os.environ["RUST_LOG"] = said or "off"
     try:
         program = importlib.import_module("rerun_cli").__file__
         return Rerun(
@@ -32,3 +35,6 @@ def load_rerun() -> Rerun:
         )
     except ImportError as error:
         raise MissingExtraError("surefoot view", "rerun-sdk", "view") from error
+    finally:
+        if said is None:
+            del os.environ["RUST_LOG"]

@@ -10,7 +10,7 @@ from bridge.clock import NS
 from bridge.colours import FAINT, FALL, FORECAST, TRANSIENT, rgb
 from bridge.messages import NodeStatus
 from bridge.topics import DIAGNOSTICS, TOPICS, TWIST, Topic
-from bridge.view.canvas import Canvas
+from bridge.view.canvas import Canvas, Moment
 
 EVENTS: Final = "events"
 SUMMARY: Final = "health/summary"
@@ -30,8 +30,11 @@ _LEVEL_COLOUR: Final = {
     SILENT: FAINT,
     GONE: "#7a1d18",
 }
+MOST_FIGURES: Final = 512  # of all processes: what the wire says shall not fill the memory here
+MOST_ROLES: Final = 32
 _EVENT_LEVEL: Final = ("INFO", "WARN", "ERROR", "WARN")
 _NUMBERS: Final = re.compile(r"[-+]?\d+(\.\d+)?")
+_SILENCE_NS: Final = round(DIAGNOSTICS.max_age_s * NS)
 _SUMMARY_NS: Final = round(0.2 * NS)
 _ROLE_COLOUR: Final = {
     "perception": FORECAST,
@@ -50,6 +53,7 @@ class HealthPanel:
     def __init__(self, canvas: Canvas) -> None:
         self._canvas = canvas
         self._statuses: dict[str, NodeStatus] = {}
+        self._heard_ns: dict[str, int] = {}  # role -> arrival of its newest status
         self._states: dict[str, str] = {}  # role -> ok, warning, error, stale, silent or gone
         self._named: set[str] = set()  # paths whose curve has a name
         self._said: dict[str, str] = {}  # subject -> what was said of it last
@@ -62,7 +66,10 @@ class HealthPanel:
     def status(self, status: NodeStatus, arrival_ns: int) -> None:
         """Take in what a process says about itself."""
         role = status.role
+        if role not in self._states and len(self._states) >= MOST_ROLES:
+            return
         self._statuses[role] = status
+        self._heard_ns[role] = arrival_ns
         level = min(status.level, len(LEVELS) - 1)
         if self._become(role, LEVELS[level]):
             self.say(f"process {role}", f"{role}: {status.summary}", _EVENT_LEVEL[level])
@@ -70,8 +77,11 @@ class HealthPanel:
             value = _number(text)
             if value is None:
                 continue
-            path, unit = _place(role, key)
+            place, unit = _place(role, key)
+            path = "/".join(self._canvas.sdk.escape_entity_path_part(part) for part in place)
             if path not in self._named:
+                if len(self._named) >= MOST_FIGURES:
+                    continue
                 self._named.add(path)
                 name = f"{role} {key.removeprefix('age_ms.').removesuffix('_age_ms')}".removesuffix(" rate_hz")
                 self._canvas.curves(path, (f"{name}{unit}",), (_ROLE_COLOUR.get(role, FAINT),), (1.5,))
@@ -92,10 +102,10 @@ class HealthPanel:
             self.say(f"process {role}", f"{role} is on the wire", "INFO")
 
     def silent(self, now_ns: int) -> None:
-        """Mark the roles whose last status is too old."""
-        for role, status in self._statuses.items():
-            late = now_ns - status.stamp_ns > DIAGNOSTICS.max_age_s * NS
-            if late and self._states.get(role) not in {SILENT, GONE}:
+        """Mark the roles that have said nothing for longer than the diagnostics allow."""
+        for role, heard_ns in self._heard_ns.items():
+            if now_ns - heard_ns > _SILENCE_NS and self._states[role] not in {SILENT, GONE}:
+                self._canvas.at(Moment(self._statuses[role].stamp_ns + _SILENCE_NS, heard_ns + _SILENCE_NS))
                 self._become(role, SILENT)
                 self.say(f"process {role}", f"{role} says nothing any more", "ERROR")
 
@@ -111,7 +121,7 @@ class HealthPanel:
         """Begin a new stretch of the role's lane; return whether it is one."""
         if self._states.get(role) == state:
             return False
-        path = f"{PROCESS}/{role}"
+        path = f"{PROCESS}/{self._canvas.sdk.escape_entity_path_part(role)}"
         if role not in self._states:
             values = list(_LEVEL_COLOUR)
             colours = [rgb(_LEVEL_COLOUR[value]) for value in values]
@@ -154,12 +164,12 @@ def _number(text: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _place(role: str, key: str) -> tuple[str, str]:
-    """Return where a value of a status is plotted, and its unit."""
+def _place(role: str, key: str) -> tuple[tuple[str, ...], str]:
+    """Return where a value of a status is plotted, part by part, and its unit."""
     if key == "rate_hz":
-        return f"{RATE}/{role}", " [Hz]"
+        return (*RATE.split("/"), role), " [Hz]"
     if key == "age_ms":
-        return f"{AGE}/{role}/frame", " [ms]"
+        return (*AGE.split("/"), role, "frame"), " [ms]"
     if key.startswith("age_ms.") or key.endswith("_age_ms"):
-        return f"{AGE}/{role}/{key.removeprefix('age_ms.').removesuffix('_age_ms')}", " [ms]"
-    return f"{FIGURE}/{role}/{key}", ""
+        return (*AGE.split("/"), role, key.removeprefix("age_ms.").removesuffix("_age_ms")), " [ms]"
+    return (*FIGURE.split("/"), role, key), ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import os
 import tempfile
+import warnings
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, Self
@@ -41,10 +42,10 @@ class RrdFile:
         """
         reader: Any = importlib.import_module("rerun.chunk").RrdReader
         try:
-            reader(self.part).store()  # reads the footer, which is written last
+            with warnings.catch_warnings(action="ignore"):  # what it warns of is what is asked here
+                reader(self.part).store()  # reads the footer, which is written last
         except Exception as error:
-            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise SurefootError(f"{self.path}: could not be written whole, is the disk full? ({reason})") from error
+            raise SurefootError(f"{self.path}: could not be written whole; is the disk full?") from error
         try:
             mask = os.umask(0)
             os.umask(mask)

@@ -80,7 +80,8 @@ class Scene:
             self._health.say(topic.key, str(error), "WARN")
             return
         self._health.say(topic.key, "", "INFO")
-        self._heard[topic.key] = moment
+        if topic != DIAGNOSTICS:  # every role has its own silence there
+            self._heard[topic.key] = moment
         self._draw(message, arrival_ns)
 
     def look(self, now_ns: int) -> None:
@@ -91,12 +92,10 @@ class Scene:
             if last is None or now_ns - last.stamp_ns <= limit_ns or now_ns - last.arrival_ns <= limit_ns:
                 continue
             self._canvas.at(Moment(last.stamp_ns + limit_ns, last.arrival_ns + limit_ns))
-            if topic == DIAGNOSTICS:
-                self._health.silent(now_ns)
-                continue
             self._drop(topic, None)
             text = f"{topic.key} is silent: nothing for {topic.max_age_s * 1e3:.0f} ms"
             self._health.say(topic.key, text, "ERROR")
+        self._health.silent(now_ns)
 
     def alive(self, role: str, alive: bool, now_ns: int) -> None:
         """Show that a process has come or gone."""

@@ -58,6 +58,15 @@ class Viewer:
         """Whether it is still there."""
         return self._process.poll() is None
 
+    def require_well(self) -> None:
+        """Raise if it has died; that its window was closed is no fault.
+
+        Raises:
+            SurefootError: it has; the text is what it said.
+        """
+        if self._process.poll():
+            raise SurefootError(f"Rerun's viewer died: {self._last_words()}; {INSTEAD}")
+
     def close(self) -> None:
         """End it."""
         for number, patience_s in ((signal.SIGTERM, STOP_S), (signal.SIGKILL, STOP_S)):
