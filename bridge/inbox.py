@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections import deque
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -10,11 +11,15 @@ from bridge.clock import NS
 from bridge.codec import decode, prepare
 from bridge.errors import InvalidMessage
 from bridge.messages import Message
+from bridge.refusals import FloodWatch, Refusals
 from bridge.stuck import StuckWatch
 from bridge.topics import Topic
 from bridge.transport.interface import Sample, Transport
 
 M = TypeVar("M", bound=Message)
+
+_LOG = logging.getLogger("bridge.inbox")
+_LOG.addHandler(logging.NullHandler())  # said where a process sets up a log; a replay in silence stays silent
 
 FUTURE_TOLERANCE_S = 0.050  # clocks of two machines under NTP differ by less
 _RIVAL_SAID_S = 1.0  # a second publisher is a warning for this long after it was last heard
@@ -43,6 +48,8 @@ class Inbox(Generic[M]):
 
     A stream has one publisher at a time. While the one that is followed lives, what another says is refused
     and its being there is said (`rival`); it takes over when the first has been silent for `max_age_s`.
+
+    What is refused stands in the log with its reason and how often, and so does a flood; see `Refusals`.
 
     Args:
         transport: where to listen.
@@ -77,9 +84,12 @@ class Inbox(Generic[M]):
         self._fault = ""
         self.accepted = 0
         self.refused = 0
+        self._refusals = Refusals(_LOG.warning)
+        self._flood = FloodWatch(topic.key, topic.rate_hz)
         self._handle = transport.subscribe(topic, self._store)
 
     def _store(self, sample: Sample) -> None:
+        self._flood.arrived += 1
         (self._waiting if sample.source == self._source else self._waiting_others).append(sample)
         self._arrived.set()
 
@@ -123,22 +133,28 @@ class Inbox(Generic[M]):
     def _take(self, now_ns: int) -> list[M]:
         self._arrived.clear()
         taken: list[M] = []
+        if flood := self._flood.judge(now_ns):
+            self._refusals.note(flood, now_ns / NS)
         while sample := self._next():
             if self._is_rivals(sample):
                 self._rival_ns = sample.arrival_ns
-                self.refused += 1
+                self._refuse("from a second publisher while the first lives", now_ns)
                 continue
             try:
                 message = self._judge(sample, now_ns)
-            except _OldSample:
-                self.refused += 1
+            except _OldSample as error:
+                self._refuse(str(error), now_ns)
                 continue
             except InvalidMessage as error:
-                self.refused += 1
                 self._fault = str(error)
+                self._refuse(self._fault, now_ns)
                 continue
             taken.append(message)
         return taken
+
+    def _refuse(self, why: str, now_ns: int) -> None:
+        self.refused += 1
+        self._refusals.note(f"{self.topic.key}: {why}", now_ns / NS)
 
     def _next(self) -> Sample | None:
         waiting = self._waiting or self._waiting_others
@@ -151,8 +167,8 @@ class Inbox(Generic[M]):
         if ahead_s > FUTURE_TOLERANCE_S:
             limit_ms = FUTURE_TOLERANCE_S * 1e3
             raise InvalidMessage(f"{self.topic.key} is stamped {ahead_s * 1e3:.0f} ms ahead, limit {limit_ms:.0f}")
-        if self._is_old(sample, message):
-            raise _OldSample
+        if why := self._is_old(sample, message):
+            raise _OldSample(why)
         try:
             message.check()
             self._stuck.judge(message)
@@ -173,16 +189,20 @@ class Inbox(Generic[M]):
         self._source, self._sequence, self._stamp_ns = sample.source, sample.sequence, message.stamp_ns
         self._heard_ns = sample.arrival_ns
 
-    def _is_old(self, sample: Sample, message: Message) -> bool:
-        """Whether something newer was taken already: by number within a publisher, by stamp across publishers.
+    def _is_old(self, sample: Sample, message: Message) -> str:
+        """Say in what way something newer was taken already: by number within a publisher, by stamp across publishers.
 
-        Streams that every role writes interleave freely, so there each publisher is judged alone.
+        Streams that every role writes interleave freely, so there each publisher is judged alone. A number is
+        held against a publisher no longer than `max_age_s`: one forged high number silences nobody for good.
         """
-        if sample.source == self._source and sample.sequence >= 0:
-            return sample.sequence <= self._sequence
-        if self.topic.publisher == "*":
-            return False
-        return message.stamp_ns <= self._stamp_ns
+        same = sample.source == self._source and sample.sequence >= 0
+        if same and sample.arrival_ns - self._heard_ns <= self.max_age_s * NS:
+            newer = sample.sequence > self._sequence
+            return "" if newer else f"number {sample.sequence} after {self._sequence}, an old message or a repeated one"
+        if self.topic.publisher == "*" or message.stamp_ns > self._stamp_ns:
+            return ""
+        behind_ms = (self._stamp_ns - message.stamp_ns) / 1e6
+        return f"stamped {behind_ms:.0f} ms before what was taken, an old message or a repeated one"
 
     def _is_rivals(self, sample: Sample) -> bool:
         """Whether another publisher sent it while the one that is followed lives; then it is not even read."""

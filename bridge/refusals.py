@@ -8,6 +8,7 @@ from typing import Final
 
 PERIOD_S: Final = 5.0  # between two lines about the same thing
 MOST_KINDS: Final = 32  # of things told apart; an attacker who varies his words fills no memory
+FLOOD_FACTOR: Final = 20  # times the usual rate; the system is tested at ten times it
 _NUMBER = re.compile(r"-?\d[\d.]*")
 _OTHER = "other things, more of them than are told apart"
 
@@ -57,3 +58,27 @@ class Refusals:
         if kind.unsaid and waited_s >= self._period_s:
             self._say(f"refused: {kind.last} ({kind.unsaid} times in {waited_s:.0f} s)")
             kind.said_s, kind.unsaid = now_s, 0
+
+
+class FloodWatch:
+    """Notices that far more arrives than a topic carries.
+
+    `arrived` is counted up by the transport's thread; `judge` is asked by the reader.
+    """
+
+    def __init__(self, key: str, rate_hz: float) -> None:
+        self.arrived = 0
+        self._key, self._rate_hz = key, rate_hz
+        self._before, self._since_ns = 0, 0
+
+    def judge(self, now_ns: int) -> str:
+        """Return what is wrong with the last second or so; '' for nothing."""
+        span_s = (now_ns - self._since_ns) * 1e-9
+        if span_s < 1.0:
+            return ""
+        count, known = self.arrived - self._before, self._since_ns > 0
+        self._before, self._since_ns = self.arrived, now_ns
+        if not known or count <= FLOOD_FACTOR * self._rate_hz * span_s:
+            return ""
+        per_s, usual = count / span_s, self._rate_hz
+        return f"{self._key}: a flood, {per_s:.0f} a second where {usual:.0f} are usual; only the newest is read"
