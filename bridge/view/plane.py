@@ -122,7 +122,7 @@ class PlanePanel:
 def _outer(corners: Floats, box: Box) -> Floats:
     """Return a point inside of a region, towards its corner farthest from the middle of `box`."""
     away = np.linalg.norm(corners - 0.5 * (box.low + box.high), axis=1)
-    outer: Floats = 0.4 * corners.mean(axis=0) + 0.6 * corners[away.argmax()]
+    outer: Floats = 0.55 * corners.mean(axis=0) + 0.45 * corners[away.argmax()]
     return outer
 
 
