@@ -42,6 +42,7 @@ COMMANDS: Final = {
     "view": Command("bridge.view.command:view", "Look at what runs, or at a recording, in Rerun."),
     "keys": Command("bridge.keys.command:keys", "Make and look at the certificates of the roles."),
     "router": Command("bridge.launch.router:router", "Join the processes of several machines."),
+    "data": Command("anticipation.training.data_command:data", "List and check the data there is to train on."),
     "train": Command("anticipation.training.commands:train", "Train the anticipation networks."),
     "evaluate": Command(
         "anticipation.training.evaluation.command:evaluate", "Measure the anticipation, split by sequence."

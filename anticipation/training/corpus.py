@@ -9,8 +9,8 @@ from typing import Final, Literal
 
 import numpy as np
 
-from anticipation.training import mocap, upfall, urfd
-from anticipation.training.clips import Clip
+from anticipation.training import mocap, oumvlp, upfall, urfd
+from anticipation.training.clips import UNLABELLED, Clip
 from anticipation.training.samples import Samples, Track, clean, cut
 from anticipation.training.splits import Indices, grouped_folds
 from bridge.config.perception import CleaningConfig
@@ -20,6 +20,8 @@ Tested = Literal["alphapose", "movenet", "both"]
 
 DAILY_STRIDE: Final = 3  # daily activities last a minute: every third window says enough
 MOCAP_STRIDE: Final = 2
+OUMVLP_CLIPS: Final = 2000  # sequences of a second taken of each estimator
+OWN_SHARE: Final = 0.2  # of a batch, where there are recordings of the user's own
 MOCAP_KEPT: Final = 0.15  # share of the mocap clips that no network learns from
 
 
@@ -32,11 +34,12 @@ class Corpus:
     daily: tuple[Track, ...]  # UP-Fall, activities 6 to 11, and adl-40
     walks: tuple[Track, ...]  # mocap for training
     kept_walks: tuple[Track, ...]  # mocap for testing
+    own: tuple[Track, ...] = ()  # the user's recordings
 
     @property
     def people(self) -> tuple[Track, ...]:
         """Every track of a filmed person: what the folds divide."""
-        return self.falls + self.staged + self.daily
+        return self.falls + self.staged + self.daily + self.own
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +51,10 @@ class Shares:
     walks: Samples
 
 
-def read_corpus(folder: Path, mocap_clips: int, seed: int, cleaning: CleaningConfig) -> Corpus:
-    """Read, clean and sort all recordings.
+def read_corpus(
+    folder: Path, mocap_clips: int, seed: int, cleaning: CleaningConfig, own: tuple[Track, ...] = ()
+) -> Corpus:
+    """Read, clean and sort all recordings; walks of OUMVLP-Pose too, where they are there.
 
     Raises:
         SourceError: a file is missing or damaged.
@@ -60,6 +65,9 @@ def read_corpus(folder: Path, mocap_clips: int, seed: int, cleaning: CleaningCon
 
     staged = upfall.read(folder)
     walks = cleaned(mocap.read(folder, mocap_clips, seed))
+    for estimator in oumvlp.ESTIMATORS:
+        if oumvlp.is_there(folder, estimator):
+            walks += cleaned(oumvlp.read(folder, estimator, OUMVLP_CLIPS, seed))
     groups = sorted({track.group for track in walks})
     kept = set(np.random.default_rng(seed).permutation(groups)[: max(1, round(MOCAP_KEPT * len(groups)))])
     return Corpus(
@@ -68,6 +76,7 @@ def read_corpus(folder: Path, mocap_clips: int, seed: int, cleaning: CleaningCon
         daily=cleaned([*(clip for clip in staged if not upfall.is_fall(clip)), *urfd.read_daily(folder)]),
         walks=tuple(track for track in walks if track.group not in kept),
         kept_walks=tuple(track for track in walks if track.group in kept),
+        own=own,
     )
 
 
@@ -101,9 +110,22 @@ def shares(corpus: Corpus, chosen: Sequence[Track]) -> Shares:
     movenet = cut([track for track in falls if track.name.endswith("movenet")])
     staged, daily = some(corpus.staged), some(corpus.daily, DAILY_STRIDE)
     walks = cut(corpus.walks, MOCAP_STRIDE)
-    motion = [(alphapose, 0.4), (movenet, 0.2), (staged, 0.15), (daily, 0.05), (walks, 0.2)]
-    gait = [(alphapose, 0.55), (movenet, 0.2), (staged, 0.1), (daily, 0.1), (walks, 0.05)]
+    own = (some(corpus.own), OWN_SHARE)
+    motion = [own, (alphapose, 0.4), (movenet, 0.2), (staged, 0.15), (daily, 0.05), (walks, 0.2)]
+    gait = [
+        (_labelled(own[0]), OWN_SHARE),
+        (alphapose, 0.55),
+        (movenet, 0.2),
+        (staged, 0.1),
+        (daily, 0.1),
+        (walks, 0.05),
+    ]
     return Shares(_there(motion), _there(gait), walks)
+
+
+def _labelled(samples: Samples) -> Samples:
+    """Leave out samples that say nothing of the state."""
+    return samples.take(np.flatnonzero((samples.labels != UNLABELLED).any(axis=1)))
 
 
 def _there(weighted: list[tuple[Samples, float]]) -> list[tuple[Samples, float]]:

@@ -20,6 +20,7 @@ FPS: Final = 30.0
 SHORTEST: Final = 45  # frames: a window, a horizon and as much again to settle the filters
 LONGEST: Final = 150  # frames taken of one clip under one camera
 LICENCES: Final = {"cmu": "free for all uses", "bandai_namco": "CC BY-NC 4.0"}
+ANKLE_M: Final = 0.10  # of a foot on the floor
 WALKS: Final = ("walk", "run", "dash")
 
 
@@ -44,11 +45,21 @@ def read(folder: Path, clips: int, seed: int) -> list[Clip]:
     return [clip for clip in drawn if len(clip.keypoints) >= SHORTEST]
 
 
+def on_floor(points: Floats) -> Floats:
+    """Return points (T, 12, 3) [m] of a motion that has its lowest ankle where ankles are: CMU's origin is the pelvis.
+
+    The lowest keypoint of a frame in fifty decides, so that neither a jump nor a slip of the suit does.
+    """
+    shifted = points.copy()
+    shifted[..., 2] += ANKLE_M - np.percentile(points[..., 2].min(axis=1), 2.0)
+    return shifted
+
+
 def _seen(name: str, data: str, points: Floats, index: int, rng: np.random.Generator) -> Clip:
     """Cut a stretch of the motion and look at it through a random camera."""
     start = int(rng.integers(max(1, len(points) - LONGEST)))
     camera = draw_camera(rng)
-    keypoints = observe(camera.project(points[start : start + LONGEST]), rng)
+    keypoints = observe(camera.project(on_floor(points)[start : start + LONGEST]), rng)
     labels = np.full(len(keypoints), STABLE, dtype=np.int64)
     group = f"{data}/{name}"
     return Clip(
