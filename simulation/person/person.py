@@ -1,0 +1,368 @@
+"""The person's nervous system: from what the body does to torques at the joints, 250 times a second.
+
+Standing legs push the wanted ground reaction through their soles (virtual model control: J. Pratt et al.,
+'Virtual model control', IJRR 20(2), 2001: torques = -J^T force); the swinging leg follows a path to the next foothold;
+trunk and arms keep their posture. No force acts on the person that floor, furniture, harness or a disturbance did not
+exert.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan2, cos, exp, hypot, pi, sin, sqrt
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+
+from bridge.messages import Floats
+from simulation.person.ability import FRAIL, Ability
+from simulation.person.anthropometry import BodySize
+from simulation.person.body import LEG_JOINTS, SIDES, UPPER_JOINTS
+from simulation.person.leg import leg_angles
+from simulation.person.reflexes import Reflexes
+from simulation.person.stepping import DOUBLE_SUPPORT_S, foothold, plan_step
+from simulation.person.support import Sole, Stance, double_support, ground_force, single_support, wanted_pressure
+
+CONTROL_S: Final = 0.004
+GRAVITY: Final = 9.81
+UPPER_REST: Final = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.1, -0.1, -0.3, -0.3])
+LIMP_KD: Final = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Intent:
+    """What the person wants to do."""
+
+    speed_m_s: float = 0.0
+    yaw_rate_rad_s: float = 0.0
+    crouch_m: float = 0.0  # centre of mass below its height in standing
+    trunk_pitch_rad: float = 0.0  # forward bend in the hips and the back
+    reach_rad: float = 0.0  # arms lifted forward
+    effort: float = 1.0  # share of the strength used; 0 in a faint
+
+
+class Person:
+    """Walks, stands, bends and crouches; steps to recover; gives up when there is nothing left to do."""
+
+    def __init__(
+        self,
+        model: Any,
+        data: Any,
+        size: BodySize,
+        ability: Ability = FRAIL,
+        reflexes: Reflexes | None = None,
+    ) -> None:
+        """Stand the person of `simulation.person.body.add_person` up where it is in `model`."""
+        self._model, self._data, self.size, self.ability = model, data, size, ability
+        self._reflexes = g = Reflexes() if reflexes is None else reflexes
+        self._swing_kp = np.array([g.swing_yaw_nm_rad, *[g.swing_hip_nm_rad] * 2, g.swing_knee_nm_rad, 80.0, 60.0])
+        self._swing_kd = np.array([g.swing_yaw_nms_rad, *[g.swing_hip_nms_rad] * 2, g.swing_knee_nms_rad, 3.0, 2.0])
+        self._upper_kp = np.array([600.0, 600.0, g.back_yaw_nm_rad, *[g.arm_nm_rad] * 2, 20.0, 20.0, 10.0, 10.0])
+        self._upper_kd = np.array([40.0, 40.0, 15.0, *[g.arm_nms_rad] * 2, 2.0, 2.0, 1.0, 1.0])
+        self._reaction = np.array([g.reaction_roll, g.reaction_pitch, g.reaction_yaw])
+        self._trunk_kp = np.array([g.trunk_nm_rad, g.trunk_nm_rad, g.turn_nm_rad])
+        self._trunk_kd = np.array([g.trunk_nms_rad, g.trunk_nms_rad, g.turn_nms_rad])
+        self._turn_limit = g.turn_moment_nm * size.mass_kg / 70.0
+        joints = {side: [f"{side}_{name}" for name in LEG_JOINTS] for side, _ in SIDES}
+        self._leg_dof = {s: np.array([model.joint(n).dofadr[0] for n in joints[s]]) for s in joints}
+        self._leg_q = {s: np.array([model.joint(n).qposadr[0] for n in joints[s]]) for s in joints}
+        self._leg_motor = {s: np.array([model.actuator(n).id for n in joints[s]]) for s in joints}
+        self._hip_joint = {s: np.array([model.joint(n).id for n in joints[s][:3]]) for s in joints}
+        self._upper_dof = np.array([model.joint(n).dofadr[0] for n in UPPER_JOINTS])
+        self._upper_q = np.array([model.joint(n).qposadr[0] for n in UPPER_JOINTS])
+        self._upper_motor = np.array([model.actuator(n).id for n in UPPER_JOINTS])
+        self._motors = np.concatenate((*self._leg_motor.values(), self._upper_motor))
+        self._dofs = np.concatenate((*self._leg_dof.values(), self._upper_dof))
+        self._torque = np.abs(model.actuator_ctrlrange[:, 1])
+        self.pelvis, self.torso = model.body("pelvis").id, model.body("torso").id
+        self.foot = {s: model.body(f"{s}_foot").id for s, _ in SIDES}
+        self.sole = {s: model.geom(f"{s}_sole").id for s, _ in SIDES}
+        self._hip = {s: np.array([0.0, sign * size.hip_half_width_m, 0.0]) for s, sign in SIDES}
+        self._jacobian, self._spin = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+        self._velocity = np.zeros(6)
+        self._moment_limit = ability.trunk_moment_nm * size.mass_kg / 70.0
+        self.width_m = g.step_width * size.height_m
+        self._stand_up()
+        self.standing_height_m = float(data.subtree_com[self.pelvis][2]) - 0.004 * size.height_m
+        self.pelvis_height_m = float(data.xpos[self.pelvis][2])
+        self._omega = sqrt(GRAVITY / self.standing_height_m)
+        self.heading_rad = 0.0
+        self.stance = "l"
+        self.steps = 0
+        self.fallen = False
+        self._standing = True
+        self._speed = 0.0
+        self._time_in_step = 0.0
+        self._step = plan_step(0.0, size.height_m, self.width_m, ability)
+        self._swing_from: Floats | None = None
+        self._swing_began_s = 0.0
+        self._foothold = (0.0, 0.0)
+        self._swing_angles: Floats | None = None
+        self._pitch = 0.0
+        self._crouch = 0.0
+
+    @property
+    def swing(self) -> str:
+        """The side that does not stand, or stands less."""
+        return "r" if self.stance == "l" else "l"
+
+    @property
+    def swinging(self) -> bool:
+        """Whether the swing leg is in the air by intention."""
+        return not self._standing and self._time_in_step >= self._step.double_support_s
+
+    @property
+    def phase(self) -> float:
+        """Share of the present step that is over, 0..1."""
+        return min(self._time_in_step / self._step.duration_s, 1.0)
+
+    def act(self, intent: Intent) -> None:
+        """Set the torques for the next CONTROL_S seconds."""
+        model, data, g = self._model, self._data, self._reflexes
+        mujoco.mj_subtreeVel(model, data)
+        com, com_velocity = data.subtree_com[self.pelvis], data.subtree_linvel[self.pelvis]
+        trunk = data.xmat[self.torso]
+        if trunk[8] < cos(self.ability.give_up_tilt_rad) or com[2] < 0.62 * self.standing_height_m:
+            self.fallen = True
+        effort = 0.0 if self.fallen else intent.effort
+        if effort <= 0.0:
+            self._limp()
+            return
+        self._follow(intent)
+        dcm = (float(com[0] + com_velocity[0] / self._omega), float(com[1] + com_velocity[1] / self._omega))
+        heading = (cos(self.heading_rad), sin(self.heading_rad))
+        lead, trail = self._sole_of(self.stance), self._sole_of(self.swing)
+        self._decide(dcm, lead, trail, intent, heading)
+        lead, trail = self._sole_of(self.stance), self._sole_of(self.swing)
+        torque = np.zeros(model.nu)
+        stance, in_air = self._stance(dcm, lead, trail, heading)
+        moment = self._trunk_moment(heading)
+        if in_air:
+            reaction = self._swing_leg(torque, dcm, stance.centre, lead, heading)
+            moment += self._reaction * reaction
+            moment[2] = min(max(moment[2], -self._turn_limit), self._turn_limit)
+        height = self.standing_height_m - self._crouch
+        lift = min(max(g.lift_1_s2 * (height - float(com[2])) - g.lift_1_s * float(com_velocity[2]), -6.0), 6.0)
+        vertical = self.size.mass_kg * max(GRAVITY + lift, 2.0)
+        force = ground_force(com, max(float(com[2]), 0.3), stance.centre, vertical, (moment[0], moment[1]))
+        sides = (self.stance,) if in_air else (self.stance, self.swing)
+        for side, share, point in zip(sides, stance.share, stance.pressure, strict=True):
+            self._push(torque, side, share * force, point, share * moment[2])
+        self._posture(torque, intent)
+        limit = self._torque * (self.ability.strength * effort)
+        np.clip(torque, -limit, limit, out=torque)
+        data.ctrl[self._motors] = torque[self._motors]
+        self._time_in_step += CONTROL_S
+
+    # --- what to do -------------------------------------------------------------------------------------------------
+
+    def _follow(self, intent: Intent) -> None:
+        """Let wishes become movements no faster than a body can."""
+        change = 0.6 * CONTROL_S
+        self._speed += min(max(intent.speed_m_s - self._speed, -change), change)
+        if not self._standing:
+            self.heading_rad += intent.yaw_rate_rad_s * CONTROL_S
+        self._pitch += min(max(intent.trunk_pitch_rad - self._pitch, -1.5 * CONTROL_S), 1.5 * CONTROL_S)
+        self._crouch += min(max(intent.crouch_m - self._crouch, -0.8 * CONTROL_S), 0.8 * CONTROL_S)
+
+    def _decide(
+        self, dcm: tuple[float, float], lead: Sole, trail: Sole, intent: Intent, heading: tuple[float, float]
+    ) -> None:
+        """Start, end and repeat steps."""
+        if self._standing:
+            astray = self._astray(dcm, lead, trail, heading)
+            if intent.speed_m_s > 0.02 or astray:
+                self._begin(self._first_stance(dcm, lead, trail, heading))
+            return
+        planned = self._step.duration_s
+        if self._time_in_step < self._step.double_support_s + 0.5 * (planned - self._step.double_support_s):
+            return
+        landed = self._on_floor(self.swing)
+        if not ((landed and self._time_in_step > 0.9 * planned) or self._time_in_step > planned + 0.15):
+            return
+        self.steps += 1
+        wants_rest = intent.speed_m_s < 0.02 and self._speed < 0.05
+        if wants_rest and not self._astray(dcm, lead, trail, heading):
+            self._standing, self._swing_from = True, None
+        else:
+            self._begin(self.swing)
+
+    def _begin(self, stance: str) -> None:
+        self._standing = False
+        self.stance, self._time_in_step, self._swing_from = stance, 0.0, None
+        self._step = plan_step(self._speed, self.size.height_m, self.width_m, self.ability)
+
+    def _astray(self, dcm: tuple[float, float], lead: Sole, trail: Sole, heading: tuple[float, float]) -> bool:
+        """Whether standing still can no longer keep the DCM over the feet."""
+        stance = double_support(lead, trail, dcm, heading, 0.0)
+        return hypot(dcm[0] - stance.centre[0], dcm[1] - stance.centre[1]) > 0.015
+
+    def _first_stance(self, dcm: tuple[float, float], lead: Sole, trail: Sole, heading: tuple[float, float]) -> str:
+        """Return the foot to stand on: the one the body moves towards."""
+        side = heading[0] * (dcm[1] - (lead.y + trail.y) / 2) - heading[1] * (dcm[0] - (lead.x + trail.x) / 2)
+        left = self.stance if self.stance == "l" else self.swing
+        if abs(side) < 0.01:
+            return self.stance
+        return left if side > 0 else ("r" if left == "l" else "l")
+
+    # --- how to do it -----------------------------------------------------------------------------------------------
+
+    def _stance(
+        self, dcm: tuple[float, float], lead: Sole, trail: Sole, heading: tuple[float, float]
+    ) -> tuple[Stance, bool]:
+        """Return the stance and whether the other leg is in the air."""
+        if self._standing:
+            middle = ((lead.x + trail.x) / 2, (lead.y + trail.y) / 2)
+            return double_support(lead, trail, self._pressure(dcm, middle, middle), heading, 0.0), False
+        step, remaining = self._step, self._until_transfer()
+        side = 1.0 if self.stance == "l" else -1.0
+        bx, by = step.offset(self._omega, side)
+        shrink = exp(-self._omega * remaining)
+        ahead, beside = (step.length_m + bx) * shrink, (-side * step.width_m + by) * shrink
+        c, s = heading
+        reference = (lead.x + c * ahead - s * beside, lead.y + s * ahead + c * beside)
+        wanted = self._pressure(dcm, reference, (lead.x, lead.y))
+        if self._time_in_step >= step.double_support_s:
+            return single_support(lead, wanted, heading), True
+        return double_support(lead, trail, wanted, heading, self._time_in_step / step.double_support_s), False
+
+    def _pressure(
+        self, dcm: tuple[float, float], reference: tuple[float, float], nominal: tuple[float, float]
+    ) -> tuple[float, float]:
+        return wanted_pressure(dcm, reference, nominal, 1.0 + self._reflexes.dcm_gain_1_s / self._omega)
+
+    def _until_transfer(self) -> float:
+        """Return the time until the load has half gone over to the next foot [s]."""
+        return max(self._step.duration_s - self._time_in_step, 0.0) + self._reflexes.transfer * DOUBLE_SUPPORT_S
+
+    def _swing_leg(
+        self, torque: Floats, dcm: tuple[float, float], centre: tuple[float, float], lead: Sole,
+        heading: tuple[float, float],
+    ) -> Floats:  # fmt: skip
+        """Move the swing leg towards the foothold; return the moment (3,) with which the leg turns the pelvis [N m]."""
+        data, step, side, g = self._data, self._step, self.swing, self._reflexes
+        ankle = data.xpos[self.foot[side]]
+        c, s = heading
+        remaining = self._until_transfer()
+        sign = 1.0 if self.stance == "l" else -1.0
+        growth = exp(self._omega * remaining)
+        px, py = lead.x + g.pressure_carried * (centre[0] - lead.x), lead.y + g.pressure_carried * (centre[1] - lead.y)
+        bx, by = step.offset(self._omega, sign)
+        dx = px + (dcm[0] - px) * growth - lead.x
+        dy = py + (dcm[1] - py) * growth - lead.y
+        target = foothold((c * dx + s * dy - bx, c * dy - s * dx - by), sign, self.size.height_m, self.ability)
+        if self._swing_from is None:
+            self._swing_from, self._swing_began_s, self._swing_angles = ankle.copy(), self._time_in_step, None
+            self._foothold = target
+        blend = min(CONTROL_S / max(self.ability.reaction_s / 3.0, CONTROL_S), 1.0)
+        self._foothold = (
+            self._foothold[0] + blend * (target[0] - self._foothold[0]),
+            self._foothold[1] + blend * (target[1] - self._foothold[1]),
+        )
+        forward, left = self._foothold[0] - self.size.sole_forward_m, self._foothold[1]
+        u = min(
+            max((self._time_in_step - self._swing_began_s) / max(step.duration_s - self._swing_began_s, 0.05), 0), 1
+        )
+        early = min(g.swing_early * u, 1.0)
+        way = early**3 * (10.0 - 15.0 * early + 6.0 * early**2)
+        start = self._swing_from
+        wanted = np.array([
+            (1 - way) * start[0] + way * (lead.x + c * forward - s * left),
+            (1 - way) * start[1] + way * (lead.y + s * forward + c * left),
+            self.size.ankle_height_m + g.swing_lift_m * sin(pi * u) - max(u - 0.9, 0.0) * g.swing_down,
+        ])  # fmt: skip
+        rotation = data.xmat[self.pelvis].reshape(3, 3)
+        upright = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        angles = leg_angles(
+            rotation.T @ (wanted - data.xpos[self.pelvis]), rotation.T @ upright, self._hip[side],
+            self.size.thigh_m, self.size.shank_m,
+        )  # fmt: skip
+        rate = np.zeros(6) if self._swing_angles is None else (angles - self._swing_angles) / CONTROL_S
+        self._swing_angles = angles
+        np.clip(rate, -15.0, 15.0, out=rate)
+        dof, motor = self._leg_dof[side], self._leg_motor[side]
+        move = self._swing_kp * (angles - data.qpos[self._leg_q[side]]) + self._swing_kd * (rate - data.qvel[dof])
+        move *= self.size.strength
+        limit = self._torque[motor] * self.ability.strength
+        np.clip(move, -limit, limit, out=move)
+        torque[motor] = move + data.qfrc_bias[dof]
+        reaction: Floats = data.xaxis[self._hip_joint[side]].T @ move[:3]
+        return reaction
+
+    def _trunk_moment(self, heading: tuple[float, float]) -> Floats:
+        """Return the moment (3,) that turns the pelvis to its wanted posture [N m]."""
+        mujoco.mj_objectVelocity(self._model, self._data, mujoco.mjtObj.mjOBJ_BODY, self.pelvis, self._velocity, 0)
+        m = self._data.xmat[self.pelvis]
+        c, s = heading
+        lean = 0.6 * self._pitch  # the rest is in the back
+        cl, sl = cos(lean), sin(lean)
+        # columns of the wanted orientation: Rz(heading) Ry(lean)
+        x, y, z = (c * cl, s * cl, -sl), (-s, c, 0.0), (c * sl, s * sl, cl)
+        fx, fy, fz = m[0::3], m[1::3], m[2::3]
+        error = 0.5 * np.array([
+            fx[1] * x[2] - fx[2] * x[1] + fy[1] * y[2] - fy[2] * y[1] + fz[1] * z[2] - fz[2] * z[1],
+            fx[2] * x[0] - fx[0] * x[2] + fy[2] * y[0] - fy[0] * y[2] + fz[2] * z[0] - fz[0] * z[2],
+            fx[0] * x[1] - fx[1] * x[0] + fy[0] * y[1] - fy[1] * y[0] + fz[0] * z[1] - fz[1] * z[0],
+        ])  # fmt: skip
+        moment = self._trunk_kp * error - self._trunk_kd * self._velocity[:3]
+        moment *= self.size.strength
+        limit = np.array([self._moment_limit, self._moment_limit, self._turn_limit])
+        np.clip(moment, -limit, limit, out=moment)
+        return moment
+
+    def _push(self, torque: Floats, side: str, force: Floats, point: tuple[float, float], turn: float) -> None:
+        """Add the torques with which the leg of `side` pushes `force` through `point` of the floor."""
+        ankle = self._data.xpos[self.foot[side]]
+        dof = self._leg_dof[side]
+        mujoco.mj_jac(self._model, self._data, self._jacobian, self._spin, ankle, self.foot[side])
+        rx, ry, rz = point[0] - ankle[0], point[1] - ankle[1], -self.size.ankle_height_m
+        fx, fy, fz = force
+        moment = np.array([ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx + turn])
+        torque[self._leg_motor[side]] = -(self._jacobian[:, dof].T @ force + self._spin[:, dof].T @ moment)
+
+    def _posture(self, torque: Floats, intent: Intent) -> None:
+        """Hold the back, swing the arms against the legs, reach."""
+        data = self._data
+        feet = data.xpos[self.foot["l"]] - data.xpos[self.foot["r"]]
+        apart = cos(self.heading_rad) * feet[0] + sin(self.heading_rad) * feet[1]
+        swing = self._reflexes.arm_swing_rad * min(abs(self._speed), 1.0) * min(max(apart / 0.5, -1.0), 1.0)
+        wanted = UPPER_REST.copy()
+        wanted[0] = 0.4 * self._pitch
+        wanted[3] += swing - intent.reach_rad
+        wanted[4] -= swing + intent.reach_rad
+        dof = self._upper_dof
+        gain = self._upper_kp * (wanted - data.qpos[self._upper_q]) - self._upper_kd * data.qvel[dof]
+        torque[self._upper_motor] = self.size.strength * gain + data.qfrc_bias[dof]
+
+    def _limp(self) -> None:
+        """Leave the joints to gravity, with a little tone."""
+        data = self._data
+        data.ctrl[self._motors] = np.clip(-LIMP_KD * data.qvel[self._dofs], -5.0, 5.0)
+
+    # --- where things are -------------------------------------------------------------------------------------------
+
+    def _sole_of(self, side: str) -> Sole:
+        position, m = self._data.xpos[self.foot[side]], self._data.xmat[self.foot[side]]
+        turn = atan2(m[3], m[0])
+        forward = self.size.sole_forward_m
+        return Sole(
+            float(position[0] + cos(turn) * forward), float(position[1] + sin(turn) * forward),
+            0.42 * self.size.foot_m, 0.87 * self.size.sole_half_width_m,
+        )  # fmt: skip
+
+    def _on_floor(self, side: str) -> bool:
+        contact = self._data.contact
+        sole = self.sole[side]
+        return bool(np.any(contact.geom1 == sole) or np.any(contact.geom2 == sole))
+
+    def _stand_up(self) -> None:
+        data, size = self._data, self.size
+        root = self._model.joint("root").qposadr[0]
+        down = self._reflexes.knees_bent * size.leg_m
+        for side, sign in SIDES:
+            ankle = np.array([-0.3 * size.sole_forward_m, sign * size.hip_half_width_m, -down])
+            data.qpos[self._leg_q[side]] = leg_angles(ankle, np.eye(3), self._hip[side], size.thigh_m, size.shank_m)
+        data.qpos[root + 2] = down + size.ankle_height_m + 0.001
+        data.qpos[self._upper_q] = UPPER_REST
+        mujoco.mj_forward(self._model, data)

@@ -1,0 +1,39 @@
+"""Gains of the person's nervous system, one set for every size: torques scale with strength."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Reflexes:
+    """How stiffly and how far ahead the body acts; found by search over sizes and speeds, for 70 kg and 1.70 m."""
+
+    dcm_gain_1_s: float = 3.26  # how fast errors of the divergent component die out under a standing foot
+    pressure_carried: float = 0.3  # share of the present centre of pressure's offset expected until touchdown
+    transfer: float = 0.262  # when the load changes feet, in shares of the shortest double support
+    step_width: float = 0.122  # of the feet's middles [body heights]
+    swing_hip_nm_rad: float = 772.0
+    swing_hip_nms_rad: float = 66.4
+    swing_knee_nm_rad: float = 631.0
+    swing_knee_nms_rad: float = 28.0
+    swing_yaw_nm_rad: float = 164.0
+    swing_yaw_nms_rad: float = 9.15
+    swing_early: float = 1.0  # the foot is above its place at 1 / this of the swing
+    swing_lift_m: float = 0.032
+    swing_down: float = 0.522  # how firmly the foot is put down [m per swing]
+    reaction_pitch: float = 0.94  # share of the swinging leg's torque that the standing one takes up
+    reaction_roll: float = 1.41
+    reaction_yaw: float = 1.18
+    turn_moment_nm: float = 16.6  # about the vertical, that a foot brings to the floor
+    trunk_nm_rad: float = 618.0
+    trunk_nms_rad: float = 61.6
+    turn_nm_rad: float = 104.0
+    turn_nms_rad: float = 14.4
+    lift_1_s2: float = 44.9  # height of the centre of mass: stiffness over mass
+    lift_1_s: float = 15.0
+    arm_swing_rad: float = 0.494
+    arm_nm_rad: float = 80.2
+    arm_nms_rad: float = 9.38
+    back_yaw_nm_rad: float = 230.0
+    knees_bent: float = 0.985  # length of the standing leg, of the stretched one
