@@ -80,11 +80,24 @@ def decode(topic: Topic, payload: bytes, sequence: int = 0) -> Any:
         raise InvalidMessage(f"{topic.key} is {len(payload)} bytes, limit {MAX_PAYLOAD_BYTES}")
     try:
         raw = TYPES.deserialize_cdr(payload, topic.ros_type)
+        if topic.ros_type.startswith("surefoot_msgs/"):
+            _require_flag(payload)
         return _DECODERS[topic.ros_type](raw, sequence)
     except InvalidMessage:
         raise
     except (SerdeError, ValueError, TypeError, KeyError, IndexError, OverflowError, MemoryError, struct.error) as error:
         raise InvalidMessage(f"{topic.key} does not decode as {topic.ros_type}: {error}") from error
+
+
+def _require_flag(payload: bytes) -> None:
+    """Refuse a `valid` that is neither 0 nor 1, the two octets CDR knows; the reader would take any other for true.
+
+    It follows the header (stamp, frame_id) and the sequence number, which is aligned to eight.
+    """
+    text_end = 12 + int.from_bytes(payload[12:16], "little" if payload[1] else "big")  # behind the encapsulation
+    flag = payload[4 + (text_end + 7) // 8 * 8 + 8]
+    if flag > 1:
+        raise InvalidMessage(f"valid is {flag}, limits 0..1")
 
 
 def _time(stamp_ns: int) -> Any:

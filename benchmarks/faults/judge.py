@@ -47,6 +47,7 @@ class Timed(NamedTuple):
     arrival_ns: int
     message: Any
     source: bytes
+    number: int = 0  # counts up by one per publisher
 
 
 def first_stop(commands: Iterable[Timed], since_ns: int) -> Timed | None:
@@ -80,13 +81,15 @@ def largest_jump(commands: Sequence[Timed], limits: GateLimits) -> float:
 def largest_motion_jump(motion: Sequence[Timed], limits: GateLimits) -> float:
     """Return the largest share of the allowed acceleration in what the drive executed.
 
-    Odometry k shows the velocity that was executed from k-1 on, so its change belongs to the period before.
+    Odometry k shows the velocity that was executed from k-1 on, so its change belongs to the period before;
+    where a sample was lost in between, to the whole time.
     """
     worst = 0.0
     for first, second, third in zip(motion, motion[1:], motion[2:], strict=False):
         if not first.source == second.source == third.source:
             continue  # the drive without a robot starts again at rest
-        dt = (second.message.stamp_ns - first.message.stamp_ns) / 1e9
+        whole = first.number + 2 == second.number + 1 == third.number
+        dt = ((second if whole else third).message.stamp_ns - first.message.stamp_ns) / 1e9
         if dt > 0.0:
             worst = max(worst, _step(_velocity(second.message), _velocity(third.message), dt, limits))
     return worst

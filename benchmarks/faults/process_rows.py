@@ -44,6 +44,7 @@ WORDS: Final = {
     "drive": "wrench|odom",
 }
 STIFF: Final = 0.9
+SUNK_LIMIT_M: Final = 0.05  # half of what an arrest may take
 
 
 class ProcessRow(NamedTuple):
@@ -84,8 +85,12 @@ def _interrupted(
 
     def back_ns() -> int | None:
         # the walker moves again, on the word of the controller and of the drive
-        after_ns = ended_ns if role != "controller" else max(ended_ns, began_ns + nanoseconds(0.2))
-        word = first_follow(timed(system, SUPPORT_COMMAND), max(after_ns, stop_ns() or after_ns))
+        stopped_ns = stop_ns()
+        if stopped_ns is None:
+            return None
+        # who was frozen may say one thing more that it had in mind before
+        after_ns = max(ended_ns, stopped_ns, began_ns + nanoseconds(0.2))
+        word = first_follow(timed(system, SUPPORT_COMMAND), after_ns)
         return None if word is None else speeding_up(timed(system, ODOMETRY), word.arrival_ns)
 
     def stop_ns() -> int | None:
@@ -158,7 +163,7 @@ def restarted_in_arrest(system: DirectSystem, role: str) -> Outcome:
         softest = min(c.message.stiffening for c in loose)
         problems.append(f"{len(loose)} commands to follow with stiffening down to {softest:.2f}")
     sunk_m = _sunk(motion, began_ns) if role != "drive" else 0.0
-    if sunk_m > 0.01:
+    if sunk_m > SUNK_LIMIT_M:
         problems.append(f"the column sank by {sunk_m * 1e3:.0f} mm")
     stop = first_stop(commands, began_ns)
     reason = "" if stop is None else stop.message.reason

@@ -65,7 +65,7 @@ def run_stream_row(system: RelayedSystem, stream: str, fault: StreamFault) -> Ou
 
 def timed(system: System, topic: Topic) -> list[Timed]:
     """Return what was heard on `topic`, in order."""
-    return [Timed(entry.arrival_ns, entry.message, entry.source) for entry in system.heard[topic.key]]
+    return [Timed(entry.arrival_ns, entry.message, entry.source, entry.sequence) for entry in system.heard[topic.key]]
 
 
 def back(system: System, topic: Topic, ended_ns: int) -> int | None:

@@ -88,14 +88,14 @@ class Intervention:
 
     def _evidence(self, now_ns: int, risk: Floats, fault: str) -> Evidence:
         near, ahead = int(risk[: self._near_stages].argmax()), int(risk.argmax())
-        wrench, odometry = self._wrench.message, self._odometry.message
+        odometry = self._odometry.message
         return Evidence(
             fault=fault,
             risk_near=float(risk[near]),
             risk_ahead=float(risk[ahead]),
             why_near=self._words(now_ns, near, risk, self._supervisor.arrest_on),
             why_ahead=self._words(now_ns, ahead, risk, self._supervisor.guard_on),
-            load_n=0.0 if wrench is None else -float(wrench.force[2]),
+            load_n=self._load_n(),
             descent_m_s=0.0 if odometry is None else -float(odometry.velocity[2]),
             relaxed=self._relaxed,
         )
@@ -129,4 +129,11 @@ class Intervention:
             return risk, free._replace(release=min(self._supervisor.recover_per_s, config.release_per_s))
         if state is GaitState.DISARMED and stopped_by_fault:
             return np.zeros_like(risk), free
+        if state is GaitState.DISARMED and self._load_n() >= self._supervisor.harness_load_arrest_n:
+            # started again while a person hangs in the harness: stiff before anything moves
+            return np.ones_like(risk), free._replace(rise=config.arrest_per_s)
         return risk, free
+
+    def _load_n(self) -> float:
+        """Return the downward pull at the interface [N]; 0 before the first wrench."""
+        return 0.0 if self._wrench.message is None else -float(self._wrench.message.force[2])

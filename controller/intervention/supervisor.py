@@ -102,7 +102,7 @@ def _from_disarmed(m: _Moment) -> _Transition | None:
     if m.evidence.fault:
         return _Transition(GaitState.DISARMED, m.evidence.fault)
     if m.lasted(m.since.good, m.config.arm_dwell_s):
-        return _Transition(GaitState.FOLLOW, f"all inputs good for {m.config.arm_dwell_s * 1e3:.0f} ms")
+        return _arrest(m) or _Transition(GaitState.FOLLOW, f"all inputs good for {m.config.arm_dwell_s * 1e3:.0f} ms")
     return None
 
 
@@ -110,7 +110,9 @@ def _from_safe_stop(m: _Moment) -> _Transition | None:
     if m.evidence.fault:
         return _safe_stop(m)
     if m.config.auto_rearm and m.lasted(m.since.good, m.config.rearm_dwell_s):
-        return _Transition(GaitState.RECOVER, f"all inputs good for {m.config.rearm_dwell_s * 1e3:.0f} ms")
+        return _arrest(m) or _Transition(
+            GaitState.RECOVER, f"all inputs good for {m.config.rearm_dwell_s * 1e3:.0f} ms"
+        )
     return None
 
 
@@ -151,9 +153,15 @@ def _safe_stop(m: _Moment) -> _Transition:
 
 
 def _stop_or_arrest(m: _Moment) -> _Transition | None:
-    """What comes before everything else while moving; load and descent do not wait for vision."""
-    if m.evidence.fault:
-        return _safe_stop(m)
+    """What comes before everything else while moving."""
+    return _safe_stop(m) if m.evidence.fault else _arrest(m)
+
+
+def _arrest(m: _Moment) -> _Transition | None:
+    """A fall that is there or near; load and descent do not wait for vision.
+
+    Who is started again, or gets its inputs back, while a person hangs in the harness goes on arresting.
+    """
     if m.lasted(m.since.loaded, m.config.trigger_dwell_s):
         words = f"harness load {m.evidence.load_n:.0f} N, limit {m.config.harness_load_arrest_n:.0f}"
         return _Transition(GaitState.ARREST, words)

@@ -159,6 +159,22 @@ class TestWithoutVision:
         assert person.run(0.1, walking, descent=0.4).reason == "column descends at 0.40 m/s, limit 0.30"
 
 
+class TestRestart:
+    def test_with_a_person_in_the_harness_the_first_command_to_follow_is_stiff(self) -> None:
+        person = Person()
+        person.run(0.5, walking, load_n=600.0)
+        assert person.states() == [GaitState.DISARMED, GaitState.ARREST]
+        moving = [decision for decision in person.history if not decision.stop]
+        assert min(decision.stiffening for decision in moving) == pytest.approx(1.0)
+        assert "harness load 600 N" in moving[0].reason
+
+    def test_with_a_walking_person_it_is_free(self) -> None:
+        person = Person()
+        person.run(0.5, walking, load_n=60.0)
+        assert person.states() == [GaitState.DISARMED, GaitState.FOLLOW]
+        assert max(decision.stiffening for decision in person.history) < 0.1
+
+
 class TestLoss:
     @pytest.mark.parametrize(("name", "limit_s"), [("horizon", 0.2), ("wrench", 0.1), ("odometry", 0.1)])
     def test_safe_stop_in_time_and_return_through_recover(self, name: str, limit_s: float) -> None:

@@ -85,7 +85,7 @@ AFTER = {
         RECOVER: FOLLOW,
         SAFE_STOP: RECOVER,
     },
-    "fall near": dict.fromkeys(GaitState, ARREST) | {DISARMED: FOLLOW, SAFE_STOP: RECOVER},
+    "fall near": dict.fromkeys(GaitState, ARREST),
     "risk near, not critical": {
         DISARMED: FOLLOW,
         FOLLOW: GUARD,
@@ -94,9 +94,9 @@ AFTER = {
         RECOVER: FOLLOW,
         SAFE_STOP: RECOVER,
     },
-    "harness load": dict.fromkeys(GaitState, ARREST) | {DISARMED: FOLLOW, SAFE_STOP: RECOVER},
+    "harness load": dict.fromkeys(GaitState, ARREST),
     "leaning": {DISARMED: FOLLOW, FOLLOW: FOLLOW, GUARD: FOLLOW, ARREST: ARREST, RECOVER: FOLLOW, SAFE_STOP: RECOVER},
-    "descent": dict.fromkeys(GaitState, ARREST) | {DISARMED: FOLLOW, SAFE_STOP: RECOVER},
+    "descent": dict.fromkeys(GaitState, ARREST),
     "slow descent": {
         DISARMED: FOLLOW,
         FOLLOW: FOLLOW,
@@ -136,6 +136,15 @@ def test_nothing_but_a_fault_acts_without_its_dwell(state: GaitState, event: str
 def test_the_table_is_whole() -> None:
     assert set(AFTER) == set(EVENTS)
     assert all(set(row) == set(GaitState) for row in AFTER.values())
+
+
+@pytest.mark.parametrize("event", ["harness load", "descent", "fall near"])
+@pytest.mark.parametrize(("state", "dwell_s"), [(DISARMED, CONFIG.arm_dwell_s), (SAFE_STOP, CONFIG.rearm_dwell_s)])
+def test_a_fall_that_is_already_there_is_arrested_at_once(state: GaitState, dwell_s: float, event: str) -> None:
+    """A controller that is started again, or whose inputs come back, finds a person in the harness."""
+    dwell_ns = round(dwell_s * NS)
+    assert after(state, EVENTS[event], (dwell_ns - 1) / NS).state is state
+    assert after(state, EVENTS[event], dwell_s).state is ARREST
 
 
 class TestDwell:
@@ -283,12 +292,12 @@ evidences = st.builds(
     relaxed=st.booleans(),
 )
 ALLOWED = {
-    DISARMED: {FOLLOW},
+    DISARMED: {FOLLOW, ARREST},
     FOLLOW: {GUARD, ARREST, SAFE_STOP},
     GUARD: {FOLLOW, ARREST, SAFE_STOP},
     ARREST: {RECOVER, SAFE_STOP},
     RECOVER: {FOLLOW, ARREST, SAFE_STOP},
-    SAFE_STOP: {RECOVER},
+    SAFE_STOP: {RECOVER, ARREST},
 }
 
 
