@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from benchmarks.faults.process_rows import PROCESS_ROWS, arresting, hanging_syst
 from benchmarks.faults.results import RESULTS, merge, read, write_table
 from benchmarks.faults.stream_faults import FAULTS, StreamFault
 from benchmarks.faults.stream_rows import NAMES, run_stream_row
-from benchmarks.faults.system import DirectSystem, RelayedSystem
+from benchmarks.faults.system import DirectSystem, RelayedSystem, System
 
 
 def stream_rows(wanted: Callable[[str, str], bool]) -> Iterator[Outcome]:
@@ -30,7 +31,13 @@ def stream_rows(wanted: Callable[[str, str], bool]) -> Iterator[Outcome]:
     with RelayedSystem() as system:
         system.start()
         for stream, fault in rows:
-            yield run_stream_row(system, stream, fault)
+            yield _whole(system, run_stream_row(system, stream, fault))
+
+
+def _whole(system: System, outcome: Outcome) -> Outcome:
+    """Return the row with what nodes published that nobody can read."""
+    spoilt, system.spoilt = system.spoilt, []
+    return replace(outcome, problems=(*outcome.problems, *spoilt))
 
 
 def process_rows(wanted: Callable[[str, str], bool]) -> Iterator[Outcome]:
@@ -40,11 +47,11 @@ def process_rows(wanted: Callable[[str, str], bool]) -> Iterator[Outcome]:
     if walking:
         with DirectSystem() as system:
             system.start()
-            yield from (row.run(system) for row in walking)
+            yield from (_whole(system, row.run(system)) for row in walking)
     if hanging:
         with hanging_system() as system:
             system.start(lambda: arresting(system))
-            yield from (row.run(system) for row in hanging)
+            yield from (_whole(system, row.run(system)) for row in hanging)
 
 
 def main() -> int:

@@ -53,6 +53,7 @@ class System:
     def __init__(self, extra: Sequence[str] = (), script: str = "walk", **drive: str) -> None:
         self.clock = SystemClock()
         self.heard: dict[str, list[Heard]] = {topic.key: [] for topic in TOPICS}
+        self.spoilt: list[str] = []  # what a node published and nobody can read
         self.stack = ExitStack()
         self._folder = Path(self.stack.enter_context(TemporaryDirectory(prefix="surefoot-faults-")))
         write_walk(self._folder / "walk.npz", WALK_S)
@@ -162,10 +163,13 @@ class System:
         self.stack.close()
 
     def hear(self, topic: Topic, arrival_ns: int, payload: bytes, sequence: int, source: bytes) -> None:
+        """Keep one message."""
         try:
             message: Message = decode(topic, payload, max(sequence, 0))
         except InvalidMessage as error:
-            raise SystemExit(f"{topic.key}: a node published what does not decode: {error}") from error
+            print(f"{topic.key} of {source.hex()} number {sequence}: {error}: {payload.hex()}", flush=True)
+            self.spoilt.append(f"{topic.key}: {error}")
+            return
         self.heard[topic.key].append(Heard(arrival_ns, message, sequence, source))
 
 
