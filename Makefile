@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
-.PHONY: demo test lint format bench clean
+.PHONY: demo test lint format bench faults fuzz soak clean
 
 demo: $(VENV)/.base
 	$(BIN)/surefoot demo
@@ -26,7 +26,20 @@ format: $(VENV)/.dev
 bench: $(VENV)/.dev
 	$(BIN)/python -m benchmarks.mpc --json runs/bench/mpc.json
 	$(BIN)/python -m benchmarks.anticipation --json runs/bench/anticipation.json
+	$(BIN)/python -m benchmarks.wire --json runs/bench/wire.json
 	$(BIN)/surefoot latency --json runs/bench/latency.json
+
+# Real processes, faults x streams: about six minutes on an idle machine; writes the table of docs/safety.md.
+faults: $(VENV)/.dev
+	$(BIN)/python -m benchmarks.faults
+
+# A million mutated payloads for each decoder: about fifteen minutes on one core.
+fuzz: $(VENV)/.dev
+	$(BIN)/python -m benchmarks.fuzz --json runs/fuzz.json
+
+# Half an hour of the whole system at ten times the usual rates.
+soak: $(VENV)/.dev
+	$(BIN)/python -m benchmarks.soak --json runs/soak.json
 
 clean:
 	rm -rf $(VENV) runs build *.egg-info

@@ -5,9 +5,22 @@ Keys follow zenoh-bridge-ros2dds: the ROS 2 topic name without its leading slash
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 from bridge.messages import FallHorizon, Keypoints, Message, NodeStatus, Odometry, SupportCommand, Wrench
+
+
+class Quality(NamedTuple):
+    """How Zenoh carries a stream. No writer is ever held up: a sample is dropped rather than waited for."""
+
+    priority: str  # Zenoh priority
+    express: bool  # send at once, do not batch
+    delivery: Literal["every", "newest"]  # what a reader that keeps up is promised: every sample, or the newest
+
+
+SEEN: Final = Quality("interactive_high", True, "every")
+CONTROL: Final = Quality("real_time", True, "newest")  # at a rate at which one lost sample is made up for by the next
+SAID: Final = Quality("data_low", False, "every")
 
 
 class Topic(NamedTuple):
@@ -19,26 +32,29 @@ class Topic(NamedTuple):
     publisher: str  # the only role that may publish it; '*' for every role
     rate_hz: float  # nominal
     max_age_s: float  # older is a fault for every reader
-    priority: str  # Zenoh priority
-    express: bool  # send at once, do not batch
+    quality: Quality
+
+    @property
+    def priority(self) -> str:
+        """Zenoh priority."""
+        return self.quality.priority
+
+    @property
+    def express(self) -> bool:
+        """Whether samples are sent at once and not batched."""
+        return self.quality.express
 
 
-KEYPOINTS: Final = Topic(
-    "keypoints", Keypoints, "surefoot_msgs/msg/Keypoints", "perception", 30, 0.150, "interactive_high", True
-)
+KEYPOINTS: Final = Topic("keypoints", Keypoints, "surefoot_msgs/msg/Keypoints", "perception", 30, 0.150, SEEN)
 FALL_HORIZON: Final = Topic(
-    "fall_horizon", FallHorizon, "surefoot_msgs/msg/FallHorizon", "anticipation", 30, 0.150, "interactive_high", True
+    "fall_horizon", FallHorizon, "surefoot_msgs/msg/FallHorizon", "anticipation", 30, 0.150, SEEN
 )
-WRENCH: Final = Topic("wrench", Wrench, "geometry_msgs/msg/WrenchStamped", "drive", 100, 0.060, "real_time", True)
-ODOMETRY: Final = Topic("odom", Odometry, "nav_msgs/msg/Odometry", "drive", 100, 0.060, "real_time", True)
+WRENCH: Final = Topic("wrench", Wrench, "geometry_msgs/msg/WrenchStamped", "drive", 100, 0.060, CONTROL)
+ODOMETRY: Final = Topic("odom", Odometry, "nav_msgs/msg/Odometry", "drive", 100, 0.060, CONTROL)
 SUPPORT_COMMAND: Final = Topic(
-    "support_command", SupportCommand, "surefoot_msgs/msg/SupportCommand", "controller", 100, 0.060, "real_time", True
+    "support_command", SupportCommand, "surefoot_msgs/msg/SupportCommand", "controller", 100, 0.060, CONTROL
 )
-TWIST: Final = Topic(
-    "cmd_vel", SupportCommand, "geometry_msgs/msg/TwistStamped", "controller", 100, 0.060, "real_time", True
-)
-DIAGNOSTICS: Final = Topic(
-    "diagnostics", NodeStatus, "diagnostic_msgs/msg/DiagnosticArray", "*", 5, 1.0, "data_low", False
-)
+TWIST: Final = Topic("cmd_vel", SupportCommand, "geometry_msgs/msg/TwistStamped", "controller", 100, 0.060, CONTROL)
+DIAGNOSTICS: Final = Topic("diagnostics", NodeStatus, "diagnostic_msgs/msg/DiagnosticArray", "*", 5, 1.0, SAID)
 
 TOPICS: Final = (KEYPOINTS, FALL_HORIZON, WRENCH, ODOMETRY, SUPPORT_COMMAND, TWIST, DIAGNOSTICS)
