@@ -103,7 +103,7 @@ class World:
         self._impacts = frozenset(self.model.geom(name).id for name in IMPACTS)
         self._velocity = np.zeros(6)
         self.time_s = 0.0
-        self.disturbing: list[tuple[int, Floats]] = []  # (body, (6,) force and torque at its centre of mass)
+        self.disturbing: list[tuple[int, Floats]] = []  # (body, (6,) force and torque), for the next turn only
 
     def advance(self, command: Sequence[float] | Floats, intent: Intent) -> None:
         """Move on by CONTROL_S with `command` (forward, left, yaw, column velocity) and the person wanting `intent`."""
@@ -118,6 +118,7 @@ class World:
             for body, wrench in self.disturbing:
                 data.xfrc_applied[body] += wrench
             mujoco.mj_step(self.model, data)
+        self.disturbing.clear()
         self.time_s += CONTROL_S
 
     def odometry(self) -> Odometry:
@@ -154,6 +155,16 @@ class World:
         """Velocity of the pelvis (3,) [m/s]."""
         mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, self._pelvis, self._velocity, 0)
         return self._velocity[3:]
+
+    def velocity_of(self, body: int) -> tuple[float, float, float]:
+        """Return the velocity of a body's origin in the world [m/s]."""
+        mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_BODY, body, self._velocity, 0)
+        return float(self._velocity[3]), float(self._velocity[4]), float(self._velocity[5])
+
+    def set_sole_friction(self, friction: float | None) -> None:
+        """Make both soles as slippery as `friction`, or as they were (None)."""
+        for sole in self.person.sole.values():
+            self.model.geom_friction[sole, 0] = FLOOR_FRICTION if friction is None else friction
 
     def touched_down(self) -> str:
         """Return the body part other than soles and arms that touches the floor, or ''."""
