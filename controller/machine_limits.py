@@ -27,6 +27,8 @@ DRIVE_ROWS = slice(0, 8)
 TIP_ROWS = slice(8, 12)
 ROWS = 12
 _COLUMN = slice(2 * ROWS + 3, None, 4)  # the column's two limits among all
+# Part of the rectangle given away so that the stated one is kept whole: by as much a plan may leave it.
+_SPARE = 0.03
 _TIP_FRONT, _TIP_REAR, _TIP_LEFT, _TIP_RIGHT = 8, 9, 10, 11
 
 
@@ -56,7 +58,8 @@ class MachineLimits:
         config = walker.config
         self._walker = walker
         self._weight = walker.weight
-        self._half = np.array([0.5 * config.wheelbase_m, 0.5 * config.track_m]) - config.support_margin_m
+        stated = np.array([0.5 * config.wheelbase_m, 0.5 * config.track_m]) - config.support_margin_m
+        self._half = (1.0 - _SPARE) * stated
         self.column_force = config.column_force_max_n
         self.acceleration: Floats = np.array(config.acceleration_max)
         # The column's own acceleration may take this much load off the floor; the rest grips.
