@@ -142,6 +142,7 @@ def test_video_of_another_size(
 ) -> None:
     said = refused(capsys, recording, "--save", tmp_path / "out.rrd", "--video", video)
     assert "its pictures are 340x240, the keypoints are in 320x240; --crop" in said
+    assert not list(tmp_path.glob("*.rrd")) + list(tmp_path.glob(".*.rrd"))  # it had been begun
     assert "there is none" in refused(capsys, recording, "--save", tmp_path / "out.rrd", "--crop", "0,0,10,10")
     assert "no such video" in refused(capsys, recording, "--save", tmp_path / "out.rrd", "--video", tmp_path / "no.mp4")
     assert not (tmp_path / "out.rrd").exists()
