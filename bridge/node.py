@@ -98,9 +98,11 @@ def main(role: str, factory: Factory, arguments: Sequence[str] | None = None, pr
         clock = SystemClock()
         log = logging.getLogger(role)
         with ExitStack() as stack:
-            if config.bridge.keys:
-                stack.enter_context(WireLog(log))
+            wire_log = stack.enter_context(WireLog(log)) if config.bridge.keys else None
             transport = stack.enter_context(closing(ZenohTransport(config.bridge, role, clock)))
+            if wire_log is not None:
+                stack.callback(wire_log.watch, None)  # nobody looks at a session that is closed
+                wire_log.watch(transport.session)
             context = NodeContext(config, transport, clock, log, options, path, tuple(parsed.set))
             _serve(role, factory, context, stop, parsed.after, priority(config))
     except SurefootError as error:

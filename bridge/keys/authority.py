@@ -7,6 +7,7 @@ host names and addresses are what a connecting process holds against the address
 from __future__ import annotations
 
 import ipaddress
+import secrets
 from collections.abc import Iterable
 from datetime import UTC, datetime, timedelta
 from typing import Final, NamedTuple
@@ -41,7 +42,7 @@ class Pair(NamedTuple):
 def create_authority(days: int) -> Pair:
     """Return a new authority that can sign for `days`."""
     key = ec.generate_private_key(ec.SECP256R1())
-    name = _name(AUTHORITY_NAME)
+    name = _name(f"{AUTHORITY_NAME} {secrets.token_hex(4)}")  # so that two of them are told apart
     builder = _builder(name, name, key, days).add_extension(
         x509.BasicConstraints(ca=True, path_length=0), critical=True
     )

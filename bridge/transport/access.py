@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final
 
-from bridge.keys.identity import OBSERVER, PUBLISHERS, ROUTER
+from bridge.keys.identity import IDENTITIES, OBSERVER, PUBLISHERS, ROUTER
 from bridge.topics import TOPICS
 from bridge.transport.names import Names, written_by
 
@@ -45,14 +45,12 @@ def access_control(names: Names) -> dict[str, Any]:
     allow(ROUTER, ["put"], [names.key(topic) for topic in TOPICS])
     allow(ROUTER, ["liveliness_token"], [names.alive("*"), *names.graph("*")])
     allow(ROUTER, _READ, names.space)
-    allow("anyone", _ALL, names.space, flow="egress")  # who has no certificate has no link
-    subjects: list[dict[str, Any]] = [
-        {"id": identity, "cert_common_names": [identity]} for identity in (*PUBLISHERS, OBSERVER, ROUTER)
-    ]
+    for identity in IDENTITIES:
+        allow(identity, _ALL, names.space, flow="egress")
     return {
         "enabled": True,
         "default_permission": "deny",
         "rules": rules,
-        "subjects": [*subjects, {"id": "anyone"}],
+        "subjects": [{"id": identity, "cert_common_names": [identity]} for identity in IDENTITIES],
         "policies": policies,
     }

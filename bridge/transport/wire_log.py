@@ -15,11 +15,13 @@ import sys
 import threading
 import time
 from collections import Counter
-from typing import Final, Self
+from itertools import islice
+from typing import Any, Final, Self
 
 import zenoh
 
 from bridge.refusals import Refusals
+from bridge.transport.links import LinkWatch
 
 FILTER: Final = ",".join(
     (
@@ -29,17 +31,24 @@ FILTER: Final = ",".join(
     )
 )
 SWEEP_S: Final = 0.25
+LOOK_TURNS: Final = 4  # sweeps between two looks at the links
 _READ_BYTES = 1 << 18
 _MOST_PARSED = 200  # lines a sweep looks at closely; of more it tells how many
 _ZID = rb"([0-9a-f]{1,32})"
-_DENIED = re.compile(_ZID + rb"(?: on (\S+))? is unauthorized to ([A-Za-z ]+) \(ingress\) on (\S+)")
+# what a session tries is judged from a cache, and says so; filling the cache writes the same words about everything
+# that could be tried, except for declarations
+_DENIED = re.compile(
+    rb"(?:Using cached result: " + _ZID + rb" is unauthorized to ([A-Za-z ]+)"
+    rb"|" + _ZID + rb" on \S+ is unauthorized to (Liveliness Token|Declare Subscriber|Declare Queryable))"
+    rb" \(ingress\) on (\S+)"
+)
 _NAMED = re.compile(_ZID + rb" on \S*CertCommonName\(([^)]*)\)")
 _HANDSHAKE = re.compile(rb"zenoh_link_tls::\w+\S*: +(.+?)\. Hint:")
 _CONNECT = re.compile(
     rb"Unable to connect to [\w ]+? (\S+?)!.*?((?:invalid peer|received fatal)[^\n]*?)(?: at /|\.?\n)"
 )
 _COLOUR = re.compile(rb"\x1b\[[0-9;]*m")
-_WORDS = {"Put": "put", "Delete": "delete", "Declare Subscriber": "read", "Liveliness Token": "say that it lives:"}
+_WORDS = {"Declare Subscriber": "read", "Declare Queryable": "answer for", "Liveliness Token": "claim"}
 
 
 class Digest:
@@ -68,17 +77,16 @@ class Digest:
 
     def _take_denials(self, text: bytes, now_s: float) -> None:
         found: Counter[tuple[str, bytes, bytes]] = Counter()
-        for number, match in enumerate(_DENIED.finditer(text)):
-            if number >= _MOST_PARSED:
-                break
-            session, _subject, action, key = match.groups()
-            found[self._names.get(session, "someone without a known name"), action, key] += 1
-        rest = text.count(b" is unauthorized to ") - text.count(b"(egress)") - sum(found.values())
-        for (name, action, key), count in found.items():
+        for match in islice(_DENIED.finditer(text), _MOST_PARSED):
+            session, action, declarer, declaration, key = match.groups()
+            name = self._names.get(session or declarer, "a session without a known name")
+            found[name, action or declaration, key] += 1
+        # what was not looked at closely is taken to be more of what was most frequent
+        rest = text.count(b" is unauthorized to ") - _MOST_PARSED if found.total() >= _MOST_PARSED else 0
+        for (name, action, key), count in found.most_common():
             verb = _WORDS.get(action.decode(), action.decode().lower())
-            # what was not looked at closely is counted with what was most frequent
-            more = max(rest, 0) if (name, action, key) == found.most_common(1)[0][0] else 0
-            self._refusals.note(f"{name} may not {verb} {key.decode('utf-8', 'replace')}", now_s, count + more)
+            self._refusals.note(f"{name} may not {verb} {key.decode('utf-8', 'replace')}", now_s, count + rest)
+            rest = 0
 
 
 class WireLog:
@@ -90,6 +98,14 @@ class WireLog:
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="wire-log", daemon=True)
         self._memory = -1
+        self._links: LinkWatch | None = None
+        self._lock = threading.Lock()
+        self._log = log
+
+    def watch(self, session: Any | None) -> None:
+        """Tell from now on who comes to `session` and who leaves; None, before it is closed: nobody's any more."""
+        with self._lock:
+            self._links = None if session is None else LinkWatch(session, self._log)
 
     def __enter__(self) -> Self:
         self._memory = os.memfd_create("zenoh-log")
@@ -110,9 +126,16 @@ class WireLog:
         os.close(self._memory)
 
     def _run(self) -> None:
-        while not self._stop.wait(SWEEP_S):
+        turn = 0
+        while True:
+            turn += 1
+            ending = self._stop.wait(SWEEP_S)
             self._sweep()
-        self._sweep()
+            if ending:
+                return
+            with self._lock:
+                if self._links is not None and turn % LOOK_TURNS == 0:
+                    self._links.look()
 
     def _sweep(self) -> None:
         text = os.pread(self._memory, _READ_BYTES, 0)

@@ -57,21 +57,24 @@ class ZenohTransport:
     Raises:
         TransportError: the endpoint of `role` is taken or malformed, or wants certificates where there are none.
         KeysError: the certificates of `role` cannot be used.
+
+    Attributes:
+        session: Zenoh's; closed with the transport.
     """
 
     def __init__(self, config: BridgeConfig, role: str, clock: Clock) -> None:
         self._clock, self._names = clock, names_of(config)
         self._declared: list[_ZenohHandle] = []  # Zenoh undeclares what nobody refers to any more
-        self._session: Any = open_session(config, role)
+        self.session: Any = open_session(config, role)
         self._entities = itertools.count(1)  # 0 is the node itself
-        self._node = self._names.node(str(self._session.info.zid()), role)
+        self._node = self._names.node(str(self.session.info.zid()), role)
         if self._node is not None:
-            self._keep(self._session.liveliness().declare_token(self._node.token()))
+            self._keep(self.session.liveliness().declare_token(self._node.token()))
 
     def publisher(self, topic: Topic) -> _ZenohPublisher:
         """Declare `topic`; samples are dropped rather than queued when a reader is slow."""
         encoding = self._names.encoding
-        publisher = self._session.declare_publisher(
+        publisher = self.session.declare_publisher(
             self._names.key(topic),
             encoding=None if encoding is None else zenoh.Encoding(encoding),
             congestion_control=zenoh.CongestionControl.DROP,
@@ -91,13 +94,13 @@ class ZenohTransport:
             callback(Sample(sample.payload.to_bytes(), sequence, source, clock.now_ns()))
 
         handler = zenoh.handlers.Callback(receive, indirect=False)
-        subscriber = self._session.declare_subscriber(self._names.key(topic), handler)
+        subscriber = self.session.declare_subscriber(self._names.key(topic), handler)
         _key, token = self._show(Endpoint.SUBSCRIPTION, topic)
         return self._keep(subscriber) if token is None else self._keep(subscriber, token)
 
     def declare_alive(self, role: str) -> _ZenohHandle:
         """Declare the liveliness token of `role`; it vanishes with the process."""
-        return self._keep(self._session.liveliness().declare_token(self._names.alive(role)))
+        return self._keep(self.session.liveliness().declare_token(self._names.alive(role)))
 
     def watch_alive(self, callback: Callable[[str, bool], None]) -> _ZenohHandle:
         """Call `callback(role, alive)` for the roles alive now and at every change."""
@@ -107,13 +110,13 @@ class ZenohTransport:
             callback(role, sample.kind == zenoh.SampleKind.PUT)
 
         handler = zenoh.handlers.Callback(receive, indirect=False)
-        return self._keep(self._session.liveliness().declare_subscriber(self._names.alive("*"), handler, history=True))
+        return self._keep(self.session.liveliness().declare_subscriber(self._names.alive("*"), handler, history=True))
 
     def close(self) -> None:
         """Close the session; everything it declared goes with it."""
         for handle in reversed(self._declared):
             handle.close()
-        self._session.close()
+        self.session.close()
 
     def _show(self, kind: Endpoint, topic: Topic) -> tuple[str, Any]:
         """Show an endpoint to ROS 2; return the key of its token and the token, or nothing where that is not done."""
@@ -122,7 +125,7 @@ class ZenohTransport:
         name = f"{self._node.namespace}/{topic.key}"
         number, hashed = next(self._entities), type_hash(topic.ros_type)
         key = self._node.endpoint_token(number, kind, name, topic.ros_type, hashed, OFFERED_QOS)
-        return key, self._session.liveliness().declare_token(key)
+        return key, self.session.liveliness().declare_token(key)
 
     def _keep(self, *entities: Any) -> _ZenohHandle:
         handle = _ZenohHandle(*entities)

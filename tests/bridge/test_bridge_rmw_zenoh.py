@@ -162,7 +162,7 @@ def wired() -> Iterator[Wired]:
 
 
 def test_ros2_sees_the_node_and_its_topics(wired: Wired) -> None:
-    session = str(wired.transport._session.info.zid())
+    session = str(wired.transport.session.info.zid())
     outbox, inbox = Outbox(wired.transport, SUPPORT_COMMAND), Inbox[Wrench](wired.transport, WRENCH)
     wait_until(lambda: len(wired.ros2.graph) == 3, "node, publisher and subscription are in the graph")
     assert f"@ros2_lv/3/{session}/0/0/NN/%/%lab%walker/controller" in wired.ros2.graph
