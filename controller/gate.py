@@ -63,6 +63,16 @@ class AxisLimits(NamedTuple):
     jerk: float
 
 
+class Held(NamedTuple):
+    """The admittance that a stop holds with: base and column are kept where they are, as stiff as in an arrest."""
+
+    damping: Sequence[float]  # (4,) [N s/m, N s/m, N m s/rad, N s/m]
+    stiffness: Sequence[float]  # (4,) [N/m, N/m, N m/rad, N/m]
+
+
+UNKNOWN: Final = Held(REST, REST)  # for gates whose output nobody renders forces from
+
+
 class SafetyGate:
     """Lets a command pass, bends it to the limits, or puts the safe command in its place.
 
@@ -70,17 +80,21 @@ class SafetyGate:
     it has `valid=False`, solver `stop` and says why.
     """
 
-    def __init__(self, limits: GateLimits, *, column_height_m: float, ordered: bool = True) -> None:
+    def __init__(
+        self, limits: GateLimits, *, column_height_m: float, ordered: bool = True, held: Held = UNKNOWN
+    ) -> None:
         """Start at rest.
 
         Args:
             limits: what no command may exceed.
             column_height_m: height to hold until the first command [m].
             ordered: refuse commands whose sequence number is not newer; False where none is filled in yet.
+            held: what a stop says it holds with; a drive that renders forces must not find zeros there.
         """
         self._limits = limits
         self._axes = limits.axes()
         self._ordered = ordered
+        self._held = held
         self._velocity = [0.0] * 4
         self._acceleration = [0.0] * 4
         self._target = [0.0] * 4  # velocity commanded last, for the slope of the command
@@ -209,8 +223,8 @@ class SafetyGate:
             acceleration=np.array(self._acceleration),
             column_height=self._height,
             stiffening=1.0 if told is None else told.stiffening,
-            damping=np.zeros(4),  # no admittance is rendered: base and column are held where they are
-            stiffness=np.zeros(4),
+            damping=np.array(self._held.damping),
+            stiffness=np.array(self._held.stiffness),
             state=state,
             solver="stop",
             lifetime_s=self._limits.lifetime_s,

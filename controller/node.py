@@ -17,7 +17,7 @@ from bridge.node import Node, NodeContext, main
 from bridge.outbox import Outbox
 from bridge.timing import LoopTiming, Spread
 from bridge.topics import FALL_HORIZON, ODOMETRY, SUPPORT_COMMAND, TWIST, WRENCH
-from controller.gate import GateLimits, SafetyGate
+from controller.gate import GateLimits, Held, SafetyGate
 from controller.interface import Controller, Decision
 from controller.intervention.intervention import Intervention
 from controller.limits import check_limits
@@ -43,6 +43,7 @@ class ControllerNode:
             GateLimits(**config.gate.model_dump()),
             column_height_m=config.admittance.height_hold_m,
             ordered=False,  # the outbox numbers commands after the gate
+            held=Held(config.admittance.damping_arrest, config.admittance.stiffness_stop),
         )
         limits, stuck_s, wire = config.supervisor, config.inputs.stuck_after_s, context.transport
         self._horizon = Inbox[FallHorizon](wire, FALL_HORIZON, limits.horizon_age_limit_s, stuck_after_s=stuck_s)

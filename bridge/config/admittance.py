@@ -117,6 +117,12 @@ class AdmittanceConfig(Section):
         )
 
     @property
+    def stiffness_stop(self) -> tuple[float, float, float, float]:
+        """Stiffness that a stop holds with: the arrest's, and what always holds the column."""
+        x, y, yaw, height = self.stiffness_arrest
+        return (x, y, yaw, height + self.stiffness_hold_height_n_m)
+
+    @property
     def stiffness_arrest(self) -> tuple[float, float, float, float]:
         """Stiffness at s = 1 along x, y [N/m], yaw [N m/rad], height [N/m]."""
         return (

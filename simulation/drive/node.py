@@ -17,7 +17,7 @@ from bridge.node import Node, NodeContext, main
 from bridge.outbox import Outbox
 from bridge.timing import LoopTiming
 from bridge.topics import ODOMETRY, SUPPORT_COMMAND, WRENCH
-from controller.gate import GateLimits, SafetyGate
+from controller.gate import GateLimits, Held, SafetyGate
 from simulation.drive.motion import DriveModel, DriveState
 from simulation.drive.script import scripted_force
 
@@ -35,7 +35,9 @@ class DriveNode:
             self._config.base_lag_s, self._config.column_lag_s, gate.column_low_m, gate.column_high_m
         )
         self._state = DriveState(height=height)
-        self._gate = SafetyGate(GateLimits(**gate.model_dump()), column_height_m=height)
+        admittance = context.config.admittance
+        held = Held(admittance.damping_arrest, admittance.stiffness_stop)
+        self._gate = SafetyGate(GateLimits(**gate.model_dump()), column_height_m=height, held=held)
         self._commands: Inbox[SupportCommand] = Inbox(context.transport, SUPPORT_COMMAND)
         self._odometry = Outbox(context.transport, ODOMETRY)
         self._wrench = Outbox(context.transport, WRENCH)

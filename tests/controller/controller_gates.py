@@ -8,7 +8,7 @@ import numpy as np
 from controller_messages import MS, NS, command
 
 from bridge.messages import SupportCommand
-from controller.gate import GateLimits, SafetyGate
+from controller.gate import GateLimits, Held, SafetyGate
 
 LIMITS = GateLimits(
     speed_m_s=1.0,
@@ -27,6 +27,7 @@ LIMITS = GateLimits(
     excess_fraction=0.1,
     frame_age_s=0.25,
 )
+HELD = Held((800.0, 800.0, 80.0, 4000.0), (3000.0, 3000.0, 250.0, 31500.0))
 PERIOD_NS = 10 * MS
 HANDED_THROUGH = (
     *("stiffening", "state", "solver", "lifetime_s", "sequence", "reason", "valid", "frame_id"),
@@ -35,7 +36,7 @@ HANDED_THROUGH = (
 
 
 def make_gate(**changes: Any) -> SafetyGate:
-    options: dict[str, Any] = {"column_height_m": 1.0, "ordered": True} | changes
+    options: dict[str, Any] = {"column_height_m": 1.0, "ordered": True, "held": HELD} | changes
     return SafetyGate(LIMITS, **options)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from controller_gates import HANDED_THROUGH, LIMITS, PERIOD_NS, make_gate, run
+from controller_gates import HANDED_THROUGH, HELD, LIMITS, PERIOD_NS, make_gate, run
 from controller_messages import MS, NS, command
 
 import controller.gate
@@ -123,8 +123,8 @@ class TestRefusing:
         assert (out.valid, out.state, out.solver) == (False, GaitState.SAFE_STOP, "stop")
         assert out.stiffening == 1.0
         assert out.lifetime_s == LIMITS.lifetime_s
-        assert not out.damping.any()
-        assert not out.stiffness.any()
+        assert out.damping.tolist() == list(HELD.damping)
+        assert out.stiffness.tolist() == list(HELD.stiffness)
         assert (out.sequence, out.rests_on_ns) == (0, 0)
         assert math.isnan(out.fall_distance)
         assert math.isnan(out.fall_probability)

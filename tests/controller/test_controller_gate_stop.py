@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from controller_gates import LIMITS, PERIOD_NS, make_gate, moving, run
+from controller_gates import HELD, LIMITS, PERIOD_NS, make_gate, moving, run
 from controller_messages import MS, NS, command
 
 from bridge.messages import GaitState
@@ -65,6 +65,12 @@ class TestStopping:
         assert (out.rests_on_ns, out.fall_distance, out.fall_probability) == (77, 1.5, 0.25)
         assert abs(out.velocity[0]) < 0.8
         assert gate.refused == refused
+        assert (tuple(out.damping), tuple(out.stiffness)) == HELD
+
+    def test_gate_that_was_not_told_what_a_stop_holds_with_says_nothing(self) -> None:
+        out = SafetyGate(LIMITS, column_height_m=1.0).filter(None, NS)
+        assert not out.damping.any()
+        assert not out.stiffness.any()
 
     def test_safe_command_need_not_know_where_the_column_is(self) -> None:
         out = make_gate().filter(command(valid=False, column_height=0.0, reason="braking"), NS)

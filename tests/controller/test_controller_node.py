@@ -92,9 +92,7 @@ class Bench:
             now_ns = NS + self._turn * PERIOD_NS
             self.clock.sleep_until(now_ns)
             if "fall_horizon" not in self.lost and self._turn % 3 == 0:
-                alive = self.person.get("distance", 5.0) + 1e-9 * (
-                    self._turn % 2
-                )  # measured, so never still
+                alive = self.person.get("distance", 5.0) + 1e-9 * (self._turn % 2)  # measured, so never still
                 self._send("fall_horizon", horizon(now_ns, **{**self.person, "distance": alive}))
             if "wrench" not in self.lost:
                 self._send("wrench", wrench(now_ns))
@@ -164,6 +162,16 @@ class TestLoss:
         assert out.velocity == pytest.approx([0.5, 0.1, 0.2, 0.0])
         assert (bench.largest_jump() <= ACCELERATION * 0.01 + 1e-9).all()
         assert bench.controller.resets == 2
+
+    def test_a_stop_is_as_stiff_as_an_arrest(self) -> None:
+        bench = Bench()
+        bench.run(1.0)
+        bench.lost = {"wrench"}
+        out = bench.run(0.3)
+        admittance = SurefootConfig().admittance
+        assert out.state is GaitState.SAFE_STOP
+        assert tuple(out.damping) == admittance.damping_arrest
+        assert tuple(out.stiffness) == admittance.stiffness_stop
 
     def test_the_controller_is_not_asked_while_stopped(self) -> None:
         bench = Bench()
