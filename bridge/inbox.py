@@ -195,10 +195,11 @@ class Inbox(Generic[M]):
         Streams that every role writes interleave freely, so there each publisher is judged alone. A number is
         held against a publisher no longer than `max_age_s`: one forged high number silences nobody for good.
         """
-        same = sample.source == self._source and sample.sequence >= 0
-        if same and sample.arrival_ns - self._heard_ns <= self.max_age_s * NS:
-            newer = sample.sequence > self._sequence
-            return "" if newer else f"number {sample.sequence} after {self._sequence}, an old message or a repeated one"
+        if sample.source == self._source and sample.sequence >= 0:
+            if sample.sequence > self._sequence:
+                return ""
+            if sample.arrival_ns - self._heard_ns <= self.max_age_s * NS:
+                return f"number {sample.sequence} after {self._sequence}, an old message or a repeated one"
         if self.topic.publisher == "*" or message.stamp_ns > self._stamp_ns:
             return ""
         behind_ms = (self._stamp_ns - message.stamp_ns) / 1e6

@@ -112,7 +112,8 @@ def braking_since(motion: Sequence[Timed], since_ns: int, limits: GateLimits) ->
     )
     if hard is None:
         return None
-    while hard > 0 and slopes[hard - 1][1] - slopes[hard][1] > 0.1 * limits.acceleration_m_s2:
+    ramp = 0.1 * limits.acceleration_m_s2
+    while hard > 1 and slopes[hard - 2][1] - slopes[hard - 1][1] > ramp:
         hard -= 1
     began_ns: int = slopes[hard][0]
     return began_ns

@@ -22,14 +22,15 @@ from bridge.topics import TOPICS
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    keys = [topic.key for topic in TOPICS]
+    decoders = {topic.ros_type: topic for topic in reversed(TOPICS)}  # one for each type
+    keys = [topic.key for topic in decoders.values()]
     parser.add_argument("--topic", action="append", choices=keys, help="only this decoder; repeatable")
     parser.add_argument("--count", type=int, default=1_000_000, help="payloads for each decoder")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--json", type=Path, help="merged by decoder into this file")
     arguments = parser.parse_args()
     failed = False
-    for topic in TOPICS:
+    for topic in decoders.values():
         if arguments.topic and topic.key not in arguments.topic:
             continue
         found = fuzz(topic, corpus(topic), arguments.count, arguments.seed)

@@ -19,21 +19,21 @@ _HEADER: Final = ("sec:i", "nanosec:I", "frame_id:s")
 
 # name:type or name:type*count; s is a string
 LAYOUTS: Final[Mapping[str, Sequence[str]]] = {
-    "keypoints": (
+    "surefoot_msgs/msg/Keypoints": (
         *_HEADER, "sequence:Q", "valid:?", "reason:s", "image_width:I", "image_height:I", "position:d*24",
         "confidence:d*12", "status:B*12", "body_length:d", "people:I",
     ),
-    "fall_horizon": (
+    "surefoot_msgs/msg/FallHorizon": (
         *_HEADER, "sequence:Q", "valid:?", "reason:s", "step:d", "quality:d", "probabilities:d*48", "distance:d*16",
         "rate:d*16", "time:d*16", "centre:d*48", "plane:d*32", "forecast:d*384",
     ),
-    "support_command": (
+    "surefoot_msgs/msg/SupportCommand": (
         *_HEADER, "sequence:Q", "valid:?", "reason:s", "rests_sec:i", "rests_nanosec:I", "lifetime:d", "state:s",
         "linear:d*3", "angular:d*3", "acceleration:d*4", "height:d", "stiffening:d", "damping:d*4", "stiffness:d*4",
         "fall_distance:d", "fall_probability:d", "solver:s", "solve_time:d",
     ),
-    "wrench": (*_HEADER, "force:d*3", "torque:d*3"),
-    "odom": (
+    "geometry_msgs/msg/WrenchStamped": (*_HEADER, "force:d*3", "torque:d*3"),
+    "nav_msgs/msg/Odometry": (
         *_HEADER, "child_frame_id:s", "position:d*3", "orientation:d*4", "pose_covariance:d*36", "linear:d*3",
         "angular:d*3", "twist_covariance:d*36",
     ),
@@ -87,17 +87,17 @@ class _Walk:
             raise Malformed("longer than the message")
 
 
-def parse(key: str, payload: bytes) -> Values:
+def parse(ros_type: str, payload: bytes) -> Values:
     """Return the fields of `payload` by name.
 
     Raises:
-        Malformed: it is not one whole message of the topic `key`.
+        Malformed: it is not one whole message of `ros_type`.
     """
     walk = _Walk(payload)
-    if key == "diagnostics":
+    if ros_type == "diagnostic_msgs/msg/DiagnosticArray":
         return _parse_diagnostics(walk)
     values: Values = {}
-    for item in LAYOUTS[key]:
+    for item in LAYOUTS[ros_type]:
         name, _, kind = item.partition(":")
         if kind == "s":
             values[name] = walk.text()
@@ -121,13 +121,13 @@ def _parse_diagnostics(walk: _Walk) -> Values:
     return {"sec": sec, "nanosec": nanosec, "frame_id": frame_id, "level": level, "texts": texts, "pairs": pairs}
 
 
-def wrong(key: str, values: Values) -> str:
+def wrong(ros_type: str, values: Values) -> str:
     """Return why the message must not be acted on, '' if it may."""
     if values["nanosec"] >= 1_000_000_000:
         return "nanosec"
-    if values.get("valid") == 0 and key != "support_command":
+    if values.get("valid") == 0 and ros_type != "surefoot_msgs/msg/SupportCommand":
         return "declared invalid"
-    return _RULES[key](values)
+    return _RULES[ros_type](values)
 
 
 def _finite(values: Values, *names: str) -> str:
@@ -204,10 +204,10 @@ def _diagnostics(v: Values) -> str:
 
 
 _RULES: Final[Mapping[str, Callable[[Values], str]]] = {
-    "keypoints": _keypoints,
-    "fall_horizon": _horizon,
-    "support_command": _command,
-    "wrench": _wrench,
-    "odom": _odometry,
-    "diagnostics": _diagnostics,
+    "surefoot_msgs/msg/Keypoints": _keypoints,
+    "surefoot_msgs/msg/FallHorizon": _horizon,
+    "surefoot_msgs/msg/SupportCommand": _command,
+    "geometry_msgs/msg/WrenchStamped": _wrench,
+    "nav_msgs/msg/Odometry": _odometry,
+    "diagnostic_msgs/msg/DiagnosticArray": _diagnostics,
 }

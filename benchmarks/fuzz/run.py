@@ -78,7 +78,7 @@ def _judge(found: Finding, topic: Topic, payload: bytes) -> None:
     reason = "cmd_vel is not read" if topic is TWIST else ""
     if not reason:
         try:
-            reason = wrong(topic.key, parse(topic.key, payload))
+            reason = wrong(topic.ros_type, parse(topic.ros_type, payload))
         except Malformed as error:
             reason = f"malformed: {error}"
     if reason:

@@ -89,6 +89,16 @@ def force(inbox: Inbox[Wrench], now_ns: int) -> float | None:
     return None if message is None else float(message.force[0])
 
 
+def test_a_publisher_that_was_silent_may_say_more_about_the_same_moment(hub: MemoryHub, clock: ManualClock) -> None:
+    """As anticipation does: without keypoints it says, by the stamp of the last ones, that its horizon is not valid."""
+    inbox = Inbox[Wrench](hub.transport(), WRENCH)
+    put(inbox, b"a", 7, START, x=1)
+    assert force(inbox, START) == 1
+    later = clock.advance(0.2)
+    put(inbox, b"a", 8, later, x=2, stamp_ns=START)
+    assert force(inbox, later) == 2
+
+
 def test_of_two_publishers_the_first_is_followed_and_the_other_named(hub: MemoryHub, clock: ManualClock) -> None:
     inbox = Inbox[Wrench](hub.transport(), WRENCH)
     for number in range(20):
