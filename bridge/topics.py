@@ -45,6 +45,7 @@ class Topic(NamedTuple):
         return self.quality.express
 
 
+DETECTIONS: Final = Topic("detections", Keypoints, "surefoot_msgs/msg/Keypoints", "drive", 30, 0.150, SEEN)
 KEYPOINTS: Final = Topic("keypoints", Keypoints, "surefoot_msgs/msg/Keypoints", "perception", 30, 0.150, SEEN)
 FALL_HORIZON: Final = Topic(
     "fall_horizon", FallHorizon, "surefoot_msgs/msg/FallHorizon", "anticipation", 30, 0.150, SEEN
@@ -57,4 +58,4 @@ SUPPORT_COMMAND: Final = Topic(
 TWIST: Final = Topic("cmd_vel", SupportCommand, "geometry_msgs/msg/TwistStamped", "controller", 100, 0.060, CONTROL)
 DIAGNOSTICS: Final = Topic("diagnostics", NodeStatus, "diagnostic_msgs/msg/DiagnosticArray", "*", 5, 1.0, SAID)
 
-TOPICS: Final = (KEYPOINTS, FALL_HORIZON, WRENCH, ODOMETRY, SUPPORT_COMMAND, TWIST, DIAGNOSTICS)
+TOPICS: Final = (DETECTIONS, KEYPOINTS, FALL_HORIZON, WRENCH, ODOMETRY, SUPPORT_COMMAND, TWIST, DIAGNOSTICS)

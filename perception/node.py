@@ -162,7 +162,7 @@ def create(context: NodeContext) -> PerceptionNode:
         source_config = source_config.model_copy(update={"crop_px": parse_crop(context.options["crop"])})
     name = context.options.get("estimator") or config.estimator
     uri = context.options.get("source") or source_config.uri
-    source = open_source(uri, source_config, context.clock)
+    source = open_source(uri, source_config, context.clock, context.transport)
     try:
         estimator = load_estimator(name, config) if source.gives_images else None
     except SurefootError:

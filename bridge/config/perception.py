@@ -58,7 +58,7 @@ class SourceConfig(Section):
     """`[perception.source]`: what the keypoints are made from."""
 
     uri: str = ""
-    """`FILE.npz:CLIP[/ARRAY]`, a video file, a folder of images, `camera:N` or a URL; "" = not set."""
+    """`FILE.npz:CLIP[/ARRAY]`, a video file, a folder of images, `camera:N`, a URL or `wire`; "" = not set."""
     crop_px: tuple[int, ...] = ()
     """Part of each image that is used: x, y, width, height; [] = the whole image."""
     paced: bool = True

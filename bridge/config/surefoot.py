@@ -14,6 +14,7 @@ from bridge.config.launch import LaunchConfig
 from bridge.config.mpc import MpcConfig
 from bridge.config.perception import PerceptionConfig
 from bridge.config.section import Section
+from bridge.config.simulation import SimulationConfig
 from bridge.config.supervisor import SupervisorConfig
 from bridge.config.walker import WalkerConfig
 
@@ -59,3 +60,6 @@ class SurefootConfig(Section):
 
     drive: DriveConfig = DriveConfig()
     """The drive without a robot."""
+
+    simulation: SimulationConfig = SimulationConfig()
+    """The world when there is no robot."""
