@@ -12,7 +12,7 @@ from bridge.clock import SystemClock
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import SurefootError
 from bridge.launch.launcher import Launcher, Phase
-from bridge.record.online import LOOK_S, Pace, Played, StandIns, play
+from bridge.record.online import LOOK_S, Pace, Played, StandIns, confined, play
 from bridge.record.reader import Recording
 from bridge.record.recorder import Recorder
 from bridge.record.roles import inputs, outputs
@@ -56,7 +56,7 @@ def feed(
     clock = SystemClock()
     with ExitStack() as stack:
         stand_ins = stack.enter_context(StandIns(config.bridge, {topic.publisher for topic in topics}, clock))
-        wire = stack.enter_context(closing(ZenohTransport(config.bridge, "recorder", clock)))
+        wire = stack.enter_context(closing(ZenohTransport(confined(config.bridge), "recorder", clock)))
         if writer is not None:
             stack.enter_context(closing(Recorder(wire, outputs(processes.roles), writer)))
         launcher = stack.enter_context(_launcher(processes))
@@ -84,7 +84,12 @@ def feed(
 def _launcher(processes: Processes) -> Launcher:
     launch = processes.config.launch.model_copy(update={"roles": tuple(processes.roles)})
     config = processes.config.model_copy(update={"launch": launch})
-    return Launcher(config, processes.config_path, processes.overrides, processes.options)
+    overrides = [
+        *processes.overrides,
+        "bridge.connect=[]",
+        "bridge.mode=peer",
+    ]  # what is fed stays here, see `confined`
+    return Launcher(config, processes.config_path, overrides, processes.options)
 
 
 def _require_running(launcher: Launcher) -> None:

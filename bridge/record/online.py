@@ -22,6 +22,18 @@ from bridge.transport.zenoh import ZenohTransport
 LOOK_S: Final = 0.05  # how often a wait looks whether it is to end
 
 
+def confined(config: BridgeConfig) -> BridgeConfig:
+    """Return `config` without the ways that lead off this machine: no routers, no clients of routers.
+
+    Raises:
+        TransportError: its endpoints themselves are elsewhere.
+    """
+    for endpoint in (*config.endpoints.values(), *config.connect):
+        if not is_loopback(endpoint):
+            raise TransportError(f"a replay stays on this machine, and {endpoint} does not: --config another file")
+    return config.model_copy(update={"connect": (), "mode": "peer"})
+
+
 class StandIns:
     """One session per role whose messages are replayed, each at that role's endpoint.
 
@@ -36,10 +48,11 @@ class StandIns:
         Raises:
             TransportError: an endpoint is taken, or the configuration leaves this machine.
         """
-        for endpoint in (*config.endpoints.values(), *config.connect):
-            if not is_loopback(endpoint):
-                raise TransportError(f"a replay stays on this machine, and {endpoint} does not: --config another file")
         wanted = [role for role in INPUTS if role in set(roles)]
+        config = confined(config)
+        for role in wanted:
+            if role not in config.endpoints:
+                raise TransportError(f"bridge.endpoints.{role} is elsewhere, and a replay stays on this machine")
         require_free(config.endpoints, wanted)
         self._stack = ExitStack()
         self._transports: dict[str, Transport] = {}

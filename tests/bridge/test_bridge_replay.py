@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from bridge.cli import main
 from bridge.clock import NS, SystemClock
 from bridge.codec import decode, encode
-from bridge.config.bridge import BridgeConfig
+from bridge.config.bridge import BridgeConfig, RouterConfig
 from bridge.config.load import load_config
 from bridge.errors import SourceError, TransportError
 from bridge.messages import FallHorizon, GaitState, SupportCommand
@@ -37,7 +37,7 @@ from bridge.topics import (
     Topic,
 )
 from bridge.transport.interface import Sample
-from bridge.transport.zenoh import ZenohTransport
+from bridge.transport.zenoh import ZenohTransport, open_session
 
 CONFIG = load_config(None)
 
@@ -245,6 +245,52 @@ def test_a_replay_stays_on_this_machine(wire: BridgeConfig) -> None:
     far = BridgeConfig(endpoints=wire.endpoints, connect=("tls/robot.example:7447",))
     with pytest.raises(TransportError, match="stays on this machine, and tls/robot.example:7447 does not"):
         StandIns(far, ["perception"], SystemClock())
+
+
+def test_a_replay_does_not_leave_through_this_machines_router(tmp_path: Path, wire: BridgeConfig) -> None:
+    """Recorded commands must not move a walker on another machine: who listens behind the router hears nothing."""
+    router = f"tcp/127.0.0.1:{free_ports(1)[0]}"
+    recording = Recording(write(tmp_path / "walk.mcap", walk(0.5)))
+    clock = SystemClock()
+    routed = BridgeConfig(endpoints=wire.endpoints, connect=(router,))
+    behind, beside = BridgeConfig(mode="client", connect=(router,)), BridgeConfig(endpoints=wire.endpoints)
+    heard: dict[str, list[Sample]] = {"behind": [], "beside": []}
+    with (
+        closing(open_session(BridgeConfig(router=RouterConfig(listen=(router,))), "router")),
+        closing(ZenohTransport(behind, "viewer", clock)) as far,
+        closing(ZenohTransport(beside, "viewer", clock)) as near,
+    ):
+        for transport, got in ((far, heard["behind"]), (near, heard["beside"])):
+            transport.subscribe(SUPPORT_COMMAND, got.append)
+        with StandIns(routed, SOURCES, clock) as stand_ins:
+            play(recording, TOPICS, stand_ins, Pace(rate=1.0, delay_s=1.0), clock, lambda _done: False)
+            wait_until(lambda: len(heard["beside"]) == 50, "the commands are heard on this machine")
+    assert heard["behind"] == []
+
+
+def test_a_replay_does_not_stand_in_for_a_role_elsewhere(wire: BridgeConfig) -> None:
+    here = BridgeConfig(endpoints={**wire.endpoints, "controller": ""})
+    with pytest.raises(TransportError, match=r"bridge.endpoints.controller is elsewhere"):
+        StandIns(here, ["controller"], SystemClock())
+
+
+@pytest.mark.parametrize("rate", [0.5, 4.0])
+def test_a_replay_goes_at_the_rate_that_was_asked_for(tmp_path: Path, wire: BridgeConfig, rate: float) -> None:
+    """By the stamps, which are moved with the messages: spans are divided by the rate."""
+    events = walk(0.4, topics=(KEYPOINTS,))
+    recording = Recording(write(tmp_path / "walk.mcap", events))
+    got: list[Sample] = []
+    clock = SystemClock()
+    with closing(ZenohTransport(wire, "viewer", clock)) as viewer, StandIns(wire, ["perception"], clock) as stand_ins:
+        viewer.subscribe(KEYPOINTS, got.append)
+        began_ns = clock.now_ns()
+        play(recording, TOPICS, stand_ins, Pace(rate, 1.0), clock, lambda _done: False)
+        lasted_s = (clock.now_ns() - began_ns) / NS - 1.0
+        wait_until(lambda: len(got) == len(events), "everything arrives")
+    recorded_s = (events[-1].sample.arrival_ns - events[0].sample.arrival_ns) / NS
+    stamps = [decode(KEYPOINTS, sample.payload).stamp_ns for sample in got]
+    assert (stamps[-1] - stamps[0]) / NS == pytest.approx(recorded_s / rate, rel=1e-3)
+    assert lasted_s >= recorded_s / rate - 0.01, "nothing is sent before its time"
 
 
 def test_a_replay_ends_when_it_is_told_to(tmp_path: Path, wire: BridgeConfig) -> None:

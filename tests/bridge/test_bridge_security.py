@@ -142,7 +142,7 @@ def test_a_stranger_whom_the_authority_knows_may_nothing(site: Site) -> None:
     write_pair(site.keys, "stranger", issue(site.authority, "stranger", [], 30))
     with closing(session(site.endpoint("controller"), tls_of(site.keys, "stranger"))) as attacker:
         heard: list[Any] = []
-        subscriber = attacker.declare_subscriber("surefoot/*", heard.append)
+        subscriber = attacker.declare_subscriber(key_of(SUPPORT_COMMAND), heard.append)
         site.knows("refused: stranger at tls/127.0.0.1:")
         seen = len(site.feed.commands)
         while len(site.feed.commands) < seen + 20:  # the controller speaks, to others
