@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import json
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
+from dataclasses import asdict
 from enum import StrEnum
+from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import torch
 import typer
@@ -12,12 +18,19 @@ from rich.console import Console
 
 from anticipation import checkpoint
 from anticipation.training import production
-from anticipation.training.clips import data_folder
+from anticipation.training.clips import data_folder, required
 from anticipation.training.corpus import read_corpus
+from anticipation.training.inventory import FILES
+from anticipation.training.journal import Journal
+from anticipation.training.log import Log, available
 from anticipation.training.networks import progress_bars
-from anticipation.training.plan import plan_for
+from anticipation.training.own import read_own
+from anticipation.training.plan import Plan, plan_for
+from anticipation.training.run import Run
+from anticipation.training.samples import Track
+from anticipation.training.team import Team, joined
 from bridge.config.perception import CleaningConfig
-from bridge.errors import SurefootError
+from bridge.errors import SourceError, SurefootError
 
 
 class Forecaster(StrEnum):
@@ -34,11 +47,20 @@ Quick = Annotated[bool, typer.Option("--quick", help="A few small fits, to see t
 Epochs = Annotated[int | None, typer.Option(min=1, max=300, help="Epochs of the shipped classifier.")]
 Folds = Annotated[int, typer.Option(min=2, max=24, help="Folds, divided by recording.")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of folds, draws and weights.")]
+RunFolder = Annotated[
+    Path | None,
+    typer.Option("--run", help="Folder of the run's states and log; default: OUT.run.", show_default=False),
+]
+Logged = Annotated[
+    bool | None,
+    typer.Option("--log/--no-log", help="Log to TensorBoard; default: where it is installed.", show_default=False),
+]
 
 
 def train(
     data: Data = None,
     out: Annotated[Path, typer.Option(help="Checkpoint to write (.safetensors).")] = Path("surefoot.safetensors"),
+    own: Annotated[Path | None, typer.Option("--own", help="Folder of your own recordings to learn from too.")] = None,
     seed: Seed = 0,
     forecaster: Annotated[Forecaster, typer.Option(help="Network that foresees the motion.")] = Forecaster.DCT_MLP,
     epochs: Epochs = None,
@@ -47,19 +69,114 @@ def train(
         Path | None,
         typer.Option("--evaluation", help="JSON of `surefoot evaluate`: calibration and metrics for the checkpoint."),
     ] = None,
+    run_folder: RunFolder = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Forget an unfinished run in that folder.")] = False,
+    device: Annotated[str, typer.Option(help="Where to compute: cpu, cuda, cuda:1.")] = "cpu",
+    logged: Logged = None,
     quick: Quick = False,
 ) -> None:
-    """Fit the networks to every recording and write a checkpoint."""
+    """Fit the networks to every recording and write a checkpoint.
+
+    After a kill, the same command goes on where the run was, and ends with the very weights it would have had.
+
+    Examples: `surefoot train --evaluation runs/evaluation.json --out mine.safetensors`,
+    `surefoot train --own recordings --device cuda`,
+    `torchrun --nproc-per-node 2 --no-python surefoot train`.
+    """
     folder = data_folder(data)
+    for file in FILES:
+        if file.needed:
+            required(folder, file.path)
     measured = None if evaluated is None else production.read_evaluation(evaluated)
     _writable(out)
     plan = plan_for(forecaster.value, seed, quick, epochs)
     _one_thread()
-    corpus = read_corpus(folder, plan.mocap_clips, seed, CleaningConfig())
-    with progress_bars() as progress:
-        made = production.make_checkpoint(corpus, plan, folds, seed, measured, progress)
-    checkpoint.save(made, out)
-    Console().print(f"wrote {out} ({out.stat().st_size / 1e6:.1f} MB)")
+    with joined(_device(device)) as (team, place):
+        settings = _settings(plan, folds, seed, measured, own, team, place)
+        with closing(Journal(run_folder or Path(f"{out}.run"), settings, team, fresh)) as journal:
+            if journal.begun:
+                _console().print(f"going on with the run in {journal.folder}", markup=False)
+            corpus = read_corpus(folder, plan.mocap_clips, seed, CleaningConfig(), _own(own))
+            with _log(logged, journal, team) as log, progress_bars(team.leads) as progress:
+                run = Run(place, team, journal, log)
+                made = production.make_checkpoint(corpus, plan, folds, seed, measured, progress, run)
+            if team.leads:
+                checkpoint.save(made, out)
+                journal.finish()
+                Console().print(f"wrote {out} ({out.stat().st_size / 1e6:.1f} MB)")
+
+
+def _settings(
+    plan: Plan,
+    folds: int,
+    seed: int,
+    measured: Mapping[str, Any] | None,
+    own: Path | None,
+    team: Team,
+    device: torch.device,
+) -> dict[str, Any]:
+    """What the result depends on beside the data, whose fingerprint each fit keeps."""
+    return {
+        "plan": asdict(plan),
+        "folds": folds,
+        "seed": seed,
+        "evaluation": None if measured is None else zlib.crc32(json.dumps(measured, sort_keys=True).encode()),
+        "own": None if own is None else str(own.resolve()),
+        "processes": team.size,
+        "device": device.type,
+        "surefoot": version("surefoot"),
+        "torch": torch.__version__,
+    }
+
+
+def _own(folder: Path | None) -> tuple[Track, ...]:
+    """Read the user's recordings.
+
+    Raises:
+        SourceError: something there cannot be used; everything is named.
+    """
+    if folder is None:
+        return ()
+    found = read_own(folder, CleaningConfig())
+    if found.problems:
+        raise SourceError("; ".join(found.problems))
+    return found.tracks
+
+
+def _device(name: str) -> torch.device:
+    """Return the device of that name.
+
+    Raises:
+        SurefootError: there is none.
+    """
+    try:
+        device = torch.device(name)
+        torch.empty(1, device=device)
+    except (RuntimeError, AssertionError) as error:  # torch asserts that it was built with CUDA
+        raise SurefootError(f"no device '{name}': {str(error).splitlines()[0]} (--device cpu, cuda, cuda:1)") from error
+    if device.type == "cuda":
+        torch.backends.cudnn.benchmark = False  # it may choose other kernels, and so other sums, in every process
+        torch.backends.cudnn.deterministic = True
+    return device
+
+
+@contextmanager
+def _log(wanted: bool | None, journal: Journal, team: Team) -> Iterator[Log | None]:
+    """Open the log of the leading process; without TensorBoard, say so, unless nobody wanted it."""
+    if wanted is None and not available() and team.leads:
+        _console().print("no log: TensorBoard is not installed (pip install 'surefoot[train]')", markup=False)
+    if not team.leads or wanted is False or (wanted is None and not available()):
+        yield None
+        return
+    log = Log(journal.folder / "log")
+    try:
+        yield log
+    finally:
+        log.close()
+
+
+def _console() -> Console:
+    return Console(stderr=True)
 
 
 def _one_thread() -> None:

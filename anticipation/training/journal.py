@@ -9,12 +9,13 @@ an uninterrupted run would have had.
 
 from __future__ import annotations
 
+import fcntl
 import json
 import re
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, BinaryIO, Final, NamedTuple
 
 from safetensors import SafetensorError
 from safetensors.torch import load as from_bytes
@@ -28,6 +29,7 @@ from bridge.errors import SurefootError
 FORMAT: Final = 1
 _HEADER: Final = "surefoot-run"
 _SETTINGS: Final = "run.json"
+_LOCK: Final = "lock"
 
 
 class Saved(NamedTuple):
@@ -53,10 +55,16 @@ class Journal:
             SurefootError: it holds another run, or cannot be written.
         """
         self.folder = folder
+        self.begun = False  # whether an earlier process left something to go on from
         self._team = team
         self._names: set[str] = set()
+        self._lock: BinaryIO | None = None
         if team.leads:
-            self._open(dict(settings), fresh)
+            try:
+                self._open(dict(settings), fresh)
+            except BaseException:
+                self.close()
+                raise
 
     def begin(self, name: str) -> None:
         """Note that a fit of this name begins.
@@ -99,18 +107,34 @@ class Journal:
         if self._team.leads:
             self._clear()
 
+    def close(self) -> None:
+        """Let others into the folder."""
+        if self._lock is not None:
+            self._lock.close()
+
     def _open(self, settings: dict[str, Any], fresh: bool) -> None:
         path = self.folder / _SETTINGS
         settings = json.loads(json.dumps(settings))  # as they will be read back
         try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._hold()
             if fresh:
                 self._clear()
+            self.begun = any(self.folder.glob("*.safetensors"))
             if path.is_file():
                 self._compare(path, settings)
             else:
                 write_whole(path, (json.dumps(settings, indent=1) + "\n").encode())
         except OSError as error:
             raise SurefootError(f"cannot keep the run in '{self.folder}': {error.strerror}") from error
+
+    def _hold(self) -> None:
+        """Keep others out of the folder; the system lets go when the process ends, however it ends."""
+        self._lock = (self.folder / _LOCK).open("wb")
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise SurefootError(f"another process trains in '{self.folder}': name another folder with --run") from error
 
     def _compare(self, path: Path, settings: dict[str, Any]) -> None:
         try:

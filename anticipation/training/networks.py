@@ -15,11 +15,12 @@ from anticipation.motion import FORECASTERS, Forecast
 from anticipation.training import fitting
 from anticipation.training.corpus import Shares
 from anticipation.training.plan import Plan
+from anticipation.training.run import ALONE, Run
 from anticipation.training.shifted import ShiftedNetwork
 
 
 @contextmanager
-def progress_bars() -> Iterator[Progress]:
+def progress_bars(shown: bool = True) -> Iterator[Progress]:
     """Show one bar for each fit, with its newest loss."""
     columns = (
         TextColumn("{task.description:<32}"),
@@ -28,7 +29,7 @@ def progress_bars() -> Iterator[Progress]:
         TextColumn("{task.fields[loss]}"),
         TimeElapsedColumn(),
     )
-    with Progress(*columns) as progress:
+    with Progress(*columns, disable=not shown) as progress:
         yield progress
 
 
@@ -41,32 +42,37 @@ def _reporter(progress: Progress, what: str, epochs: int) -> fitting.Progress:
     return report
 
 
-def pretrained_forecaster(plan: Plan, shares: Shares, progress: Progress) -> nn.Module:
+def pretrained_forecaster(plan: Plan, shares: Shares, progress: Progress, run: Run = ALONE) -> nn.Module:
     """Build the plan's forecaster and fit it to people who walk."""
     torch.manual_seed(plan.pretrain.seed)
     network: nn.Module = FORECASTERS[plan.forecaster]()
-    report = _reporter(progress, f"{plan.forecaster}: walking", plan.pretrain.epochs)
-    fitting.fit_forecaster(network, [(shares.walks, 1.0)], plan.pretrain, report)
+    what = f"{plan.forecaster}: walking"
+    report = _reporter(progress, what, plan.pretrain.epochs)
+    fitting.fit_forecaster(network, [(shares.walks, 1.0)], plan.pretrain, report, run.named(what))
     return network
 
 
-def tuned_forecaster(pretrained: nn.Module, plan: Plan, shares: Shares, name: str, progress: Progress) -> nn.Module:
+def tuned_forecaster(
+    pretrained: nn.Module, plan: Plan, shares: Shares, name: str, progress: Progress, run: Run = ALONE
+) -> nn.Module:
     """Fit a copy of a pre-trained forecaster to people who fall."""
     network = copy.deepcopy(pretrained)
-    report = _reporter(progress, f"{name}: {plan.forecaster}", plan.finetune.epochs)
-    fitting.fit_forecaster(network, shares.motion, plan.finetune, report)
+    what = f"{name}: {plan.forecaster}"
+    report = _reporter(progress, what, plan.finetune.epochs)
+    fitting.fit_forecaster(network, shares.motion, plan.finetune, report, run.named(what))
     return network.requires_grad_(False)
 
 
 def fitted_classifier(
-    plan: Plan, shares: Shares, forecast: Forecast | None, name: str, progress: Progress
+    plan: Plan, shares: Shares, forecast: Forecast | None, name: str, progress: Progress, run: Run = ALONE
 ) -> DirectedGraphNetwork:
     """Fit a classifier, on forecast windows too if a forecast is given."""
     recipe = plan.baseline if forecast is None else plan.classifier
     torch.manual_seed(recipe.seed)
     network = DirectedGraphNetwork()
-    report = _reporter(progress, f"{name}: dgnn{'' if forecast is None else ' on forecasts'}", recipe.epochs)
-    fitting.fit_classifier(network, shares.gait, recipe, forecast, report)
+    what = f"{name}: dgnn{'' if forecast is None else ' on forecasts'}"
+    report = _reporter(progress, what, recipe.epochs)
+    fitting.fit_classifier(network, shares.gait, recipe, forecast, report, run.named(what))
     return network.requires_grad_(False)
 
 

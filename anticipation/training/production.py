@@ -23,6 +23,7 @@ from anticipation.training.fitting import apply
 from anticipation.training.measures import temperatures
 from anticipation.training.networks import fitted_classifier, pretrained_forecaster, tuned_forecaster
 from anticipation.training.plan import Plan
+from anticipation.training.run import ALONE, Run
 from anticipation.training.samples import Samples, Track, cut
 from anticipation.transient import TransientPlane, fold
 from bridge.errors import SourceError
@@ -40,7 +41,13 @@ POSES: Final = 20_000  # poses that describe what a person looks like
 
 
 def make_checkpoint(
-    corpus: Corpus, plan: Plan, folds: int, seed: int, evaluation: Mapping[str, Any] | None, progress: Progress
+    corpus: Corpus,
+    plan: Plan,
+    folds: int,
+    seed: int,
+    evaluation: Mapping[str, Any] | None,
+    progress: Progress,
+    run: Run = ALONE,
 ) -> Checkpoint:
     """Fit the networks that are shipped.
 
@@ -48,18 +55,20 @@ def make_checkpoint(
     that a first pair of networks has not seen. The networks then learn from everything.
     """
     everything = shares(corpus, corpus.people)
-    pretrained = pretrained_forecaster(plan, everything, progress)
+    pretrained = pretrained_forecaster(plan, everything, progress, run)
     if evaluation is None:
         training, test = people_folds(corpus, folds, seed)[0]
         chosen = [corpus.people[index] for index in training]
-        first = fold_checkpoint(corpus, chosen, shares(corpus, chosen), pretrained, plan, seed, "calibration", progress)
+        known = shares(corpus, chosen)
+        first = fold_checkpoint(corpus, chosen, known, pretrained, plan, seed, "calibration", progress, run)
         held_out = cut(tested(corpus, test, "both"))
         temperature = temperatures(_logits(first, held_out), held_out.labels)
     else:
         temperature = np.array(evaluation["temperature"], dtype=np.float64)
-    made = fold_checkpoint(corpus, corpus.people, everything, pretrained, plan, seed, "all recordings", progress)
+    made = fold_checkpoint(corpus, corpus.people, everything, pretrained, plan, seed, "all recordings", progress, run)
     protocol = "not evaluated" if evaluation is None else str(evaluation["protocol"])
-    provenance = Provenance(DATA, LICENCE, protocol, {} if evaluation is None else dict(evaluation))
+    learnt = (*DATA, *(name for name in ("OUMVLP-Pose", "own") if any(track.source == name for track in _all(corpus))))
+    provenance = Provenance(learnt, LICENCE, protocol, {} if evaluation is None else dict(evaluation))
     return replace(made, temperature=temperature, provenance=provenance)
 
 
@@ -72,6 +81,7 @@ def fold_checkpoint(
     seed: int,
     name: str,
     progress: Progress,
+    run: Run = ALONE,
 ) -> Checkpoint:
     """Fit everything a checkpoint holds to the people in `chosen` and to the mocap walks alone; temperatures are 1.
 
@@ -84,11 +94,12 @@ def fold_checkpoint(
         seed: of whatever is drawn.
         name: what the progress bars call it.
         progress: where they are shown.
+        run: where and how the fits are done.
     """
-    forecaster = tuned_forecaster(pretrained, plan, known, name, progress)
+    forecaster = tuned_forecaster(pretrained, plan, known, name, progress, run)
     return Checkpoint(
         forecaster=forecaster,
-        classifier=fitted_classifier(plan, known, forecaster, name, progress),
+        classifier=fitted_classifier(plan, known, forecaster, name, progress, run),
         plane=_plane(corpus, chosen, seed),
         statistics=_statistics(known, seed),
         temperature=np.ones(STEPS),
@@ -109,6 +120,10 @@ def read_evaluation(path: Path) -> dict[str, Any]:
     if not isinstance(report, dict) or len(report.get("temperature", ())) != STEPS or "protocol" not in report:
         raise SourceError(f"evaluation '{path}' has no protocol or not {STEPS} temperatures: write it with --json")
     return report
+
+
+def _all(corpus: Corpus) -> tuple[Track, ...]:
+    return corpus.people + corpus.walks
 
 
 def _logits(checkpoint: Checkpoint, samples: Samples) -> NDArray[np.float32]:

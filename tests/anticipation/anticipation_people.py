@@ -38,3 +38,28 @@ def walking(seed, frames=80):
         points[:, joint, 0] += gain * swing
     points[:, :, 0] += rng.uniform(0.8, 1.3) * time[:, None]
     return points
+
+
+def make_data(folder):
+    """Write files laid out like the research data into a folder."""
+    for name in ("urfd", "upfall", "mocap"):
+        (folder / name).mkdir()
+    falls = {}
+    for number in range(8):
+        keypoints, labels = falling(number)
+        falls[f"fall-{number:02d}/alphapose"] = falls[f"fall-{number:02d}/movenet"] = keypoints
+        falls[f"fall-{number:02d}/label"] = labels
+    np.savez(folder / "urfd" / "falls.npz", **falls)
+    still, _ = falling(99)
+    np.savez(folder / "urfd" / "adls.npz", **{"adl-40/movenet": still[:25], "adl-40/label": np.full(20, -1)})
+    clips = {}
+    for activity in range(1, 12):
+        keypoints, labels = falling(activity, fps=14.0, scale=200.0)
+        if activity > 5:
+            keypoints, labels = np.concatenate([keypoints[:12]] * 4), np.full(48, -1)
+        name = f"activity{activity:02d}-trial1-cam1"
+        clips |= {f"{name}/movenet": keypoints, f"{name}/label": labels, f"{name}/fps": np.array(14.0)}
+    np.savez(folder / "upfall" / "subject1_cam1.npz", **clips)
+    np.savez(folder / "mocap" / "cmu.npz", **{f"00{i}_01": walking(i) for i in range(3)})
+    bandai = {f"dataset-1_{kind}_normal_00{i}": walking(i + 9) for kind in ("walk", "wave") for i in range(3)}
+    np.savez(folder / "mocap" / "bandai_namco.npz", **bandai)
