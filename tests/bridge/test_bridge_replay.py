@@ -136,7 +136,7 @@ def test_two_runs_of_the_command_write_the_same_file(walked: Path, tmp_path: Pat
         (["--as-fast-as-possible"], "--as-fast-as-possible goes with --only"),
         (["--only", "controller", "--topics", "odom"], "--topics goes without --only"),
         (["--only", "controller", "--as-fast-as-possible", "--rate", "2"], "--rate does not go with"),
-        (["--only", "perception"], "reads no recorded topic"),
+        (["--only", "perceptoin"], "no such role"),
         (["--only", "controller", "--option", "anticipation.x=1"], "expected ROLE.NAME=VALUE"),
         (["--only", "controller", "--option", "controller"], "expected ROLE.NAME=VALUE"),
         (["--only", "controller", "--as-fast-as-possible", "--out", "IN", "--overwrite"], "is the recording"),
