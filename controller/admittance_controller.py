@@ -18,19 +18,18 @@ from bridge.config.mpc import MpcConfig
 from bridge.config.walker import WalkerConfig
 from bridge.errors import ConfigError, InvalidMessage
 from bridge.messages import Floats, Odometry, SupportCommand, Wrench
-from controller.admittance import Admittance
+from controller.admittance import Admittance, AdmittanceStages
 from controller.commanded_motion import CommandedMotion
 from controller.fallback import fallback_acceleration, stop_acceleration, within_machine
 from controller.interface import Decision
 from controller.machine_limits import MachineLimits
 from controller.motion_limits import MotionLimits
+from controller.mpc.assembly import Instant
 from controller.mpc.plan import Failure, Plan
-from controller.mpc.predictive_law import Instant, PredictiveLaw, fading, remaining
+from controller.mpc.predictive_law import PredictiveLaw, fading, remaining
 from controller.walker import Walker
 
 Solver = Literal["mpc", "fallback", "stop"]
-# Tip-over rows hang on the column's height by the carriage's share of the centre of mass: 5 mm move it by 1 mm.
-_RELINEARISE_M = 0.005
 _ORDINARY_LOAD = 1000.0  # sum over the wrench [N, N m]
 _ORDINARY_SPEED = 5.0  # sum over the twist [m/s, rad/s]
 _LONGEST_PERIODS = 2.0  # a late step is integrated over at most this many periods
@@ -46,12 +45,19 @@ class _Inputs(NamedTuple):
     faults: tuple[str, ...]  # why the MPC must not be asked
 
 
+class _Rendered(NamedTuple):
+    """What the admittance was rendered from."""
+
+    law: AdmittanceStages
+    force: Floats  # (4,) generalised force of the person now, with what draws the command to the measured motion
+
+
 class _Choice(NamedTuple):
     """The acceleration one law asks for, before the limiter."""
 
     solver: Solver
     wanted: Floats
-    rendered: Instant | None  # what the admittance was rendered from; None in a stop
+    rendered: _Rendered | None  # None in a stop
     reason: str = ""
     solve_time_s: float = 0.0
 
@@ -87,9 +93,13 @@ class AdmittanceController:
         self._period_s = period_s
         self._lifetime_s = lifetime_s
         self._walker = Walker(walker)
+        # Yaw is the only rotation, so where the column stands does not matter to the interface's velocity.
+        self._interface: Floats = self._walker.terms.interface.copy()
         self._limits = MotionLimits(walker)
         self._machine = MachineLimits(self._walker)
         self._fading = fading(mpc)
+        self._stop_damping: Floats = np.array(admittance.damping_arrest)
+        self._stop_stiffness: Floats = np.array(admittance.stiffness_stop)
         self._admittance = Admittance(admittance, mpc.stage_s, self._fading)
         self._predictive = PredictiveLaw(self._walker, self._admittance, self._machine, mpc, period_s)
         self._motion = CommandedMotion(mpc, self._limits, (walker.column_low_m, walker.column_high_m))
@@ -111,7 +121,6 @@ class AdmittanceController:
         self._wrench_ns = 0
         self._wrench: Floats = np.zeros(6)
         self._profile: Floats = np.zeros(self._config.stages)
-        self._linearised_at_m = float("nan")
         self.last_plan: Plan | None = None
 
     def step(self, now_ns: int, odometry: Odometry, wrench: Wrench, decision: Decision) -> SupportCommand:
@@ -126,7 +135,7 @@ class AdmittanceController:
         motion.advance(acceleration, inputs.span_s)
         law = choice.rendered
         if law is not None:
-            self._admittance.settle(before, motion.velocity, law.law, law.force[0], inputs.span_s)
+            self._admittance.settle(before, motion.velocity, law.law, law.force, inputs.span_s)
         reasons = (decision.reason, *inputs.faults, choice.reason)
         return SupportCommand(
             stamp_ns=now_ns,
@@ -134,8 +143,8 @@ class AdmittanceController:
             acceleration=acceleration,
             column_height=float(motion.pose[3]),
             stiffening=float(inputs.profile[0]),
-            damping=np.zeros(4) if law is None else law.law.damping[0],
-            stiffness=np.zeros(4) if law is None else law.law.stiffness[0],
+            damping=self._stop_damping if law is None else law.law.damping[0],
+            stiffness=self._stop_stiffness if law is None else law.law.stiffness[0],
             state=decision.state,
             solver=choice.solver,
             lifetime_s=self._lifetime_s,
@@ -189,44 +198,44 @@ class AdmittanceController:
         motion = self._motion
         if not self._started:
             return _Choice("stop", np.zeros(4), None, "no usable odometry yet")
-        height_m = float(motion.pose[3])
-        terms = self._walker.evaluate(height_m, motion.velocity)
-        if not abs(height_m - self._linearised_at_m) <= _RELINEARISE_M:
-            self._machine.linearise(terms)
-            self._linearised_at_m = height_m
-        bounds = self._machine.bounds(terms, inputs.wrench, self._fading)
-        give_way = self._machine.give_way(terms, inputs.wrench, bounds)
-
-        def allowed(wanted: Floats) -> Floats:
-            return within_machine(wanted, give_way, self._machine.rows, bounds)
-
-        def stop(reason: str = "", solve_time_s: float = 0.0) -> _Choice:
-            # The spring is let go: stiffening anew anchors it where the walker comes to rest.
-            self._admittance.release()
-            wanted = stop_acceleration(motion.velocity, self._limits, inputs.span_s)
-            return _Choice("stop", allowed(wanted), None, reason, solve_time_s)
-
         if decision.stop:
-            return stop()
+            return self._stop(inputs)
 
-        force = self._fading[:, None] * (inputs.wrench @ terms.interface + inputs.draw)
-        law = self._admittance.stages(inputs.profile, motion.pose, motion.velocity, force[0])
-        instant = Instant(law, force, motion.velocity, motion.acceleration, height_m, bounds, give_way)
+        force: Floats = inputs.wrench @ self._interface + inputs.draw
+        law = self._admittance.stages(inputs.profile, motion.pose, motion.velocity, force)
         failure = Failure("", "")
         if not inputs.faults:
+            height_m = float(motion.pose[3])
+            instant = Instant(law, inputs.wrench, inputs.draw, motion.velocity, motion.acceleration, height_m)
             outcome = self._predictive.plan(instant)
             if isinstance(outcome, Plan):
                 self._last_solved_ns = now_ns
                 self.last_plan = outcome
-                return _Choice("mpc", outcome.acceleration[0], instant, solve_time_s=outcome.solve_time_s)
+                wanted = outcome.acceleration[0]
+                return _Choice("mpc", wanted, _Rendered(law, force), solve_time_s=outcome.solve_time_s)
             failure = outcome
         without_s = seconds(now_ns - self._last_solved_ns)
         if without_s > self._config.fallback_max_s:
             reason = f"no plan for {without_s * 1e3:.0f} ms, limit {self._config.fallback_max_s * 1e3:.0f}"
             reason = f"{failure.reason}; {reason}" if failure.reason else reason
-            return stop(reason, failure.solve_time_s)
-        wanted = fallback_acceleration(law, force[0], motion.velocity, self._period_s)
-        return _Choice("fallback", allowed(wanted), instant, failure.reason, failure.solve_time_s)
+            return self._stop(inputs, reason, failure.solve_time_s)
+        wanted = fallback_acceleration(law, force, motion.velocity, self._period_s)
+        rendered = _Rendered(law, force)
+        return _Choice("fallback", self._allowed(wanted, inputs), rendered, failure.reason, failure.solve_time_s)
+
+    def _stop(self, inputs: _Inputs, reason: str = "", solve_time_s: float = 0.0) -> _Choice:
+        # The spring is let go: stiffening anew anchors it where the walker comes to rest.
+        self._admittance.release()
+        wanted = stop_acceleration(self._motion.velocity, self._limits, inputs.span_s)
+        return _Choice("stop", self._allowed(wanted, inputs), None, reason, solve_time_s)
+
+    def _allowed(self, wanted: Floats, inputs: _Inputs) -> Floats:
+        """Return what the machine can do of `wanted`: the plan's own limits, counted without its code."""
+        motion, machine = self._motion, self._machine
+        terms = self._walker.evaluate(float(motion.pose[3]), motion.velocity)
+        machine.linearise(terms)
+        bounds = machine.bounds(terms, inputs.wrench, self._fading[:1])
+        return within_machine(wanted, machine.give_way(terms, inputs.wrench, bounds), machine.rows, bounds)
 
 
 def _fault(message: Odometry | Wrench) -> str:

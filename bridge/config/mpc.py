@@ -27,17 +27,23 @@ class MpcConfig(Section):
     increment_weight: float = Field(default=0.01, ge=0, le=10)
     """Weight of a change of acceleration between stages against the admittance's error, both as accelerations."""
 
-    max_iterations: int = Field(default=600, ge=5, le=20000)
-    """Most iterations of the solver for one step."""
+    solver: Literal["osqp", "daqp", "piqp"] = "daqp"
+    """QP solver: `daqp` (exact, fastest here), `osqp` (also exported as C by `surefoot codegen`), `piqp`."""
+
+    compile_c: bool = True
+    """Build the problem's functions as C, once into a cache, where there is a C compiler; else they are interpreted."""
+
+    max_iterations: int = Field(default=600, ge=1, le=20000)
+    """Most iterations of the solver for one step; `daqp` needs ten, `piqp` twenty, `osqp` fifty at its worst."""
 
     time_limit_s: float = Field(default=0.008, gt=0, le=0.1)
     """Most time of the solver for one step, on the wall clock [s]; keep it below the control period."""
 
     step_size: float = Field(default=2.0, gt=1e-6, le=1e6)
-    """Step size rho of the solver's ADMM; tuned on the benchmark for the problem's own scaling."""
+    """Step size rho of `osqp`'s ADMM; tuned on the benchmark for the problem's own scaling."""
 
     accuracy: float = Field(default=1e-5, gt=0, le=1e-2)
-    """Absolute and relative accuracy asked of the solver, in scaled units (1 = the machine's limit)."""
+    """Absolute and relative accuracy asked of `osqp` and `piqp`, in scaled units (1 = the machine's limit)."""
 
     residual_max: float = Field(default=1e-4, gt=0, le=1e-1)
     """Largest primal or dual residual, by our own count, with which a plan is accepted (scaled units)."""

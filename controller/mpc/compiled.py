@@ -1,4 +1,4 @@
-"""CasADi functions as machine code: generated C, built once into a cache; without a compiler, CasADi's own machine.
+"""C code built once into a cache: CasADi's functions as machine code; without a compiler, CasADi's own machine.
 
 Called through fixed buffers: nothing is allocated in a step. The compiled function and CasADi's virtual machine give
 the same numbers (tested); the compiled one takes a tenth of the time. The cache is `$SUREFOOT_CACHE`, else
@@ -24,7 +24,7 @@ import numpy as np
 from bridge.messages import Floats
 
 # Never -ffast-math: it would take the checks for what is not a number away.
-FLAGS = ("-O2", "-fPIC", "-shared")
+FLAGS = ("-fPIC", "-shared")
 _BUILD_LIMIT_S = 120.0
 _log = logging.getLogger(__name__)
 
@@ -54,31 +54,40 @@ class Kernel:
         self._function = function  # the buffer does not keep it alive
         self._buffer, self._call = function.buffer()
         for i, array in enumerate(self.inputs):
-            self._buffer.set_arg(i, memoryview(array))
+            self._buffer.set_arg(i, array.data)
         for i, array in enumerate(self.outputs):
-            self._buffer.set_res(i, memoryview(array))
+            self._buffer.set_res(i, array.data)
 
     def __call__(self) -> None:
         """Evaluate."""
         self._call()
 
 
-def compiled(functions: Sequence[Any]) -> list[Any]:
-    """Return the functions as machine code, or as they are where none can be made."""
+def compiled(functions: Sequence[Any], wanted: bool = True) -> list[Any]:
+    """Return CasADi functions as machine code, or as they are where none can be made or is `wanted`."""
+    path = library(source("surefoot_kernels", functions), "-O1") if wanted else None
+    return list(functions) if path is None else [ca.external(function.name(), str(path)) for function in functions]
+
+
+def library(text: str, effort: str = "-O3") -> Path | None:
+    """Return the shared library of a C source, built now if it is not in the cache; None where it cannot be.
+
+    Unrolled code gains nothing from more `effort` than -O1 and takes a compiler several times as long.
+    """
     compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc")
     if compiler is None:
-        _log.warning("no C compiler (cc, gcc or $CC): the MPC runs in CasADi's virtual machine, slower by about 0.3 ms")
-        return list(functions)
-    text = source("surefoot_kernels", functions)
-    digest = hashlib.sha256("\0".join([compiler, *FLAGS, os.uname().machine, text]).encode()).hexdigest()[:24]
+        _log.warning("no C compiler (cc, gcc or $CC): the MPC runs in CasADi's virtual machine, slower by half a ms")
+        return None
+    digest = hashlib.sha256("\0".join([compiler, effort, *FLAGS, os.uname().machine, text]).encode()).hexdigest()[:24]
     try:
-        library = cache_folder() / f"kernels-{digest}.so"
-        if not library.exists():
-            _build(compiler, text, library)
-        return [ca.external(function.name(), str(library)) for function in functions]
-    except (OSError, subprocess.SubprocessError, RuntimeError) as error:
+        path = cache_folder() / f"mpc-{digest}.so"
+        if not path.exists():
+            _log.info("building the MPC's C code, once for this configuration: %s", path)
+            _build([*compiler.split(), effort], text, path)
+    except (OSError, subprocess.SubprocessError) as error:
         _log.warning("the MPC's C code could not be built (%s): it runs in CasADi's virtual machine", _line(error))
-        return list(functions)
+        return None
+    return path
 
 
 def source(name: str, functions: Sequence[Any]) -> str:
@@ -107,17 +116,17 @@ def cache_folder() -> Path:
     return folder
 
 
-def _build(compiler: str, text: str, library: Path) -> None:
-    with tempfile.TemporaryDirectory(dir=library.parent) as scratch:
-        path, out = Path(scratch) / "kernels.c", Path(scratch) / library.name
+def _build(compiler: Sequence[str], text: str, target: Path) -> None:
+    with tempfile.TemporaryDirectory(dir=target.parent) as scratch:
+        path, out = Path(scratch) / "mpc.c", Path(scratch) / target.name
         path.write_text(text, encoding="utf-8")
         subprocess.run(  # noqa: S603 (the compiler the user named)
-            [*compiler.split(), *FLAGS, "-o", str(out), str(path), "-lm"],
+            [*compiler, *FLAGS, "-o", str(out), str(path), "-lm"],
             check=True,
             capture_output=True,
             timeout=_BUILD_LIMIT_S,
         )
-        out.replace(library)  # whole or not at all, whoever else builds the same
+        out.replace(target)  # whole or not at all, whoever else builds the same
 
 
 def _line(error: Exception) -> str:

@@ -3,88 +3,87 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from bridge.config.mpc import MpcConfig
 from bridge.messages import Floats
-from controller.admittance import Admittance, AdmittanceStages
-from controller.machine_limits import MachineBounds, MachineLimits
+from controller.admittance import Admittance
+from controller.machine_limits import MachineLimits
 from controller.motion_limits import MotionLimits
-from controller.mpc.assembly import Assembly
+from controller.mpc import solvers
+from controller.mpc.assembly import Assembly, Instant
 from controller.mpc.plan import Failure, Plan
 from controller.mpc.problem import Problem
-from controller.mpc.solver import OsqpSolver
 from controller.mpc.structure import Setting, Structure, build
 from controller.walker import Walker
-
-
-class Instant(NamedTuple):
-    """Everything one step of the MPC rests on."""
-
-    law: AdmittanceStages
-    force: (
-        Floats  # (N, 4) predicted generalised force of the person, with what draws the command to the measured motion
-    )
-    velocity: Floats  # (4,) commanded
-    previous: Floats  # (4,) acceleration applied until now
-    height_m: float  # commanded
-    bounds: MachineBounds
-    give_way: Floats  # (4,)
 
 
 class PredictiveLaw:
     """Assembles and solves the problem of each control step.
 
     Args:
-        walker: the model (for what does not change: wheel Jacobian, limits).
+        walker: the model.
         admittance: the law (for the rendered mass).
-        machine: linear limits on the acceleration; its rows are read at every step.
+        machine: linear limits on the acceleration (for what does not change in them).
         config: horizon, weights, solver.
         period_s: control period, for which the first acceleration is applied [s].
 
     Attributes:
         structure: the problem's structure.
         last_problem: what was solved last; its arrays change with the next step.
+
+    Raises:
+        MissingExtraError: the solver's package is not installed.
     """
 
     def __init__(
         self, walker: Walker, admittance: Admittance, machine: MachineLimits, config: MpcConfig, period_s: float
     ) -> None:
-        motion = MotionLimits(walker.config)
-        self._machine = machine
-        self._config = config
-        self.structure: Structure = build(
-            Setting(
-                stages=config.stages,
-                stage_s=config.stage_s,
-                period_s=period_s,
-                acceleration=motion.acceleration,
-                velocity=motion.velocity,
-                jerk=motion.jerk,
-                wheel_speed=walker.wheel_jacobian / walker.config.wheel_speed_max_rad_s,
-                mass=admittance.mass,
-                increment_weight=config.increment_weight,
-            )
-        )
-        self._stroke_m = (walker.config.column_low_m, walker.config.column_high_m)
-        self._assembly = Assembly(self.structure, machine.rows, self._stroke_m)
-        self._solver = OsqpSolver(self.structure, config)
+        self.structure: Structure = build(setting(walker, admittance, config, period_s), walker, machine)
+        self._assembly = Assembly(self.structure, config.compile_c)
+        self._solver = solvers.create(self.structure, config)
 
     def reset(self) -> None:
         """Forget the warm start."""
         self._solver.forget()
 
+    @property
+    def tip_limits(self) -> tuple[Floats, Floats]:
+        """Rows (4, 4) and limits (4,) of tip-over at the last instant: `rows @ a <= limits`; the law's own arrays."""
+        return self._assembly.tip_rows, self._assembly.tip_high
+
     def problem(self, instant: Instant) -> Problem:
         """Return the problem of this instant."""
-        law, force, velocity, previous, height_m, bounds, give_way = instant
-        return self._assembly.fill(law, force, velocity, previous, height_m, self._machine.rows, bounds, give_way)
+        return self._assembly.fill(instant)
 
     def plan(self, instant: Instant) -> Plan | Failure:
         """Solve the problem of this instant."""
-        self.last_problem = self.problem(instant)
+        self.last_problem = self._assembly.fill(instant)
+        flaw = self._assembly.flaw()
+        if flaw:
+            # The solver misses this problem, so what it was last given is no start for the next.
+            self._solver.forget()
+            return Failure(flaw, status="")
         return self._solver.solve(self.last_problem)
+
+
+def setting(walker: Walker, admittance: Admittance, config: MpcConfig, period_s: float) -> Setting:
+    """Return what the problem's structure is built from."""
+    motion = MotionLimits(walker.config)
+    return Setting(
+        stages=config.stages,
+        stage_s=config.stage_s,
+        period_s=period_s,
+        acceleration=motion.acceleration,
+        velocity=motion.velocity,
+        jerk=motion.jerk,
+        wheel_speed=walker.wheel_jacobian / walker.config.wheel_speed_max_rad_s,
+        mass=admittance.mass,
+        increment_weight=config.increment_weight,
+        fading=fading(config),
+        stroke_m=(walker.config.column_low_m, walker.config.column_high_m),
+    )
 
 
 def remaining(config: MpcConfig, age_s: float) -> float:

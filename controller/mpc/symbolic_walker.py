@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import casadi as ca
-import numpy as np
 
 from controller.machine_limits import DRIVE_ROWS, TIP_ROWS, TRACTION_ROWS, MachineLimits
 from controller.walker import Walker
@@ -101,9 +100,8 @@ def bounds(
     drive_map = ca.DM(limits.drive_map)
     alone, by_person = drive_map @ at.bias[:3], drive_map @ push[:3]
     lifted = wrench[2] / weight
-    grips = np.zeros(8)
+    grips = ca.DM.zeros(8)
     grips[TRACTION_ROWS] = 1.0
-    grips = ca.DM(grips)
     missing = ca.fmax(fading * lifted - limits.grip, 0.0)  # less load than none grips nothing
     middle = -alone + by_person @ fading
     width = ca.DM(limits.drive_high) - grips @ (fading * lifted) + grips @ missing

@@ -370,14 +370,13 @@ def test_a_fault_of_the_solver_itself_is_survived() -> None:
     loop = Loop()
     loop.run(0.2, [20.0, 0, 0, 0, 0, 0])
     solver = loop.controller._predictive._solver
-    config = solver._config
-    solver._config = config.model_copy(update={"max_iterations": 5})
+    config = solver.config
+    solver.config = config.model_copy(update={"max_iterations": 1})
     solver.forget()
     command = loop.step([150.0, 60.0, -300.0, 0, 0, 0], 1.0)
     assert command.solver == "fallback"
     assert "iteration limit" in command.reason
-    solver._config = config
-    solver.forget()
+    solver.config = config
     assert loop.step([150.0, 60.0, -300.0, 0, 0, 0], 1.0).solver == "mpc"
 
 
