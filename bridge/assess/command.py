@@ -13,6 +13,7 @@ from rich.progress import Progress
 
 from bridge.assess.clips import Clip, read_clips
 from bridge.assess.run import Assessment, assess_clip
+from bridge.clock import NS
 from bridge.config.load import load_config
 from bridge.errors import SurefootError
 
@@ -23,13 +24,16 @@ def assess(
     ],
     out: Annotated[Path, typer.Option(help="Where the results go (.npz).")],
     config: Annotated[Path | None, typer.Option(help="Configuration file; default: built-in values.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Folder for a picture of each clip, with the thresholds drawn in.")
+    ] = None,
     settings: Annotated[
         list[str] | None, typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Override one value; repeatable.")
     ] = None,
 ) -> None:
     """Run recorded keypoints through perception, anticipation and intervention, as fast as it goes.
 
-    Example: surefoot assess clips.npz --config config/surefoot.toml --out results.npz
+    Example: surefoot assess clips.npz --config config/surefoot.toml --out results.npz --plot pictures
     """
     if out.suffix != ".npz":
         raise SurefootError(f"--out {out}: expected a file name ending in .npz")
@@ -45,6 +49,10 @@ def assess(
             results[clip.name] = assess_clip(clip, parsed)
             progress.advance(task, len(clip.stamps_ns))
     write_results(results, out)
+    if plot is not None:
+        from bridge.assess.plot import write_plots  # noqa: PLC0415 (matplotlib is loaded only where it draws)
+
+        write_plots(results, {clip.name: np.array(clip.stamps_ns) / NS for clip in clips}, parsed, plot)
     typer.echo(_summary(clips, results))
 
 

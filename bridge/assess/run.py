@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ class Assessment(NamedTuple):
     stiffening: Floats  # (N,) present stiffening, 0..1
     state: np.ndarray  # (N,) text: state of the supervisor
     quality: Floats  # (N,) 0..1
+    risk: Floats  # (N, 16) what the thresholds make of each step of the horizon, 0..1
 
 
 def assess_clip(clip: Clip, config: SurefootConfig) -> Assessment:
@@ -46,12 +48,13 @@ def assess_clip(clip: Clip, config: SurefootConfig) -> Assessment:
         START_NS,
     )
     try:
-        return _run(clip, system)
+        return _run(clip, system, config)
     finally:
         system.close()
 
 
-def _run(clip: Clip, system: LockStep) -> Assessment:
+def _run(clip: Clip, system: LockStep, config: SurefootConfig) -> Assessment:
+    assess_risk = import_module("controller.intervention.risk").assess_risk
     wire = system.hub.transport()
     horizons: Inbox[FallHorizon] = Inbox(wire, FALL_HORIZON, max_age_s=float("inf"))
     commands: Inbox[SupportCommand] = Inbox(wire, SUPPORT_COMMAND, max_age_s=float("inf"))
@@ -62,6 +65,7 @@ def _run(clip: Clip, system: LockStep) -> Assessment:
         stiffening=np.full(frames, np.nan),
         state=np.full(frames, GaitState.DISARMED.value, dtype="<U9"),
         quality=np.full(frames, np.nan),
+        risk=np.full((frames, STEPS), np.nan),
     )
     seen = False
     for frame, offset_ns in enumerate(clip.stamps_ns):
@@ -75,6 +79,7 @@ def _run(clip: Clip, system: LockStep) -> Assessment:
             result.probabilities[frame] = horizon.message.probabilities
             result.distance[frame] = horizon.message.distance
             result.quality[frame] = horizon.message.quality
+            result.risk[frame] = assess_risk(horizon.message, config.intervention).total
         else:
             result.quality[frame] = 0.0
         command = commands.read(system.clock.now_ns()).message
