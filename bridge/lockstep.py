@@ -38,12 +38,12 @@ class LockStep:
 
     Args:
         config: configuration every node gets, without its limits in real time.
-        nodes: role -> its module and options, in the order in which they are stepped within one instant.
+        nodes: role -> its module (or a factory) and options, in the order in which they are stepped within one instant.
         start_ns: simulated time at which everything starts [ns].
     """
 
     def __init__(
-        self, config: SurefootConfig, nodes: Mapping[str, tuple[str, Mapping[str, str]]], start_ns: int
+        self, config: SurefootConfig, nodes: Mapping[str, tuple[str | Factory, Mapping[str, str]]], start_ns: int
     ) -> None:
         config = without_real_time(config)
         self.clock = ManualClock(start_ns)
@@ -60,7 +60,7 @@ class LockStep:
                 logging.getLogger(f"lockstep.{role}"),
                 options,
             )
-            node = load_factory(module)(context)
+            node = (load_factory(module) if isinstance(module, str) else module)(context)
             if node.period_s is None:
                 self._event_driven.append(node)
             else:

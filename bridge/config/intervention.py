@@ -15,6 +15,9 @@ class InterventionConfig(Section):
     The risk of a step is the largest of its cues. `docs/tuning.md` goes through them line by line.
     """
 
+    steps_used: int = Field(default=16, ge=0, le=16)
+    """Steps of the horizon that count: 16 all, 1 the present alone; 0: no intervention whatever happens, for trials."""
+
     distance_onset_sd: float = Field(default=1.5, ge=-20, le=20)
     """Signed distance to the fall boundary below which risk begins [within-class standard deviations]."""
 

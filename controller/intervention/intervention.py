@@ -71,7 +71,7 @@ class Intervention:
         self._odometry.take(now_ns, odometry)
         horizon_fault = self._horizon.fault(now_ns, horizon)
         fault = self._wrench.fault(now_ns, wrench) or self._odometry.fault(now_ns, odometry) or horizon_fault
-        risk = self._known.ahead(now_ns, self._ahead_s)
+        risk = self._known.ahead(now_ns, self._ahead_s) if self._active else np.zeros_like(self._ahead_s)
         evidence = self._evidence(now_ns, risk, fault)
         self._status = advance(self._status, evidence, now_ns, self._supervisor)
         profile = self._profile(now_ns, risk, fault)
@@ -96,7 +96,7 @@ class Intervention:
             why_near=self._words(now_ns, near, risk, self._supervisor.arrest_on),
             why_ahead=self._words(now_ns, ahead, risk, self._supervisor.guard_on),
             load_n=self._load_n(),
-            descent_m_s=0.0 if odometry is None else -float(odometry.velocity[2]),
+            descent_m_s=0.0 if odometry is None or not self._active else -float(odometry.velocity[2]),
             relaxed=self._relaxed,
         )
 
@@ -135,5 +135,9 @@ class Intervention:
         return risk, free
 
     def _load_n(self) -> float:
-        """Return the downward pull at the interface [N]; 0 before the first wrench."""
-        return 0.0 if self._wrench.message is None else -float(self._wrench.message.force[2])
+        """Return the downward pull at the interface [N]; 0 before the first wrench, and to who does not intervene."""
+        return 0.0 if self._wrench.message is None or not self._active else -float(self._wrench.message.force[2])
+
+    @property
+    def _active(self) -> bool:
+        return self._config.steps_used > 0

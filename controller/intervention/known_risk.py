@@ -9,7 +9,7 @@ import numpy as np
 from bridge.clock import NS
 from bridge.config.intervention import InterventionConfig
 from bridge.messages import STEPS, FallHorizon, Floats
-from controller.intervention.risk import Risk, assess_risk, describe
+from controller.intervention.risk import Risk, assess_risk, describe, looked_at
 
 
 class _Curve(NamedTuple):
@@ -48,6 +48,7 @@ class KnownRisk:
 
     def update(self, horizon: FallHorizon, start_ns: int) -> None:
         """Take a horizon whose step 0 lies at `start_ns` on the reader's clock."""
+        horizon = looked_at(horizon, max(self._config.steps_used, 1))
         self._horizon, self._risk = horizon, assess_risk(horizon, self._config)
         times_s = np.linspace(0.0, (STEPS - 1) * horizon.step_s, STEPS)
         self._newest = _Curve(times_s, self._risk.total, start_ns)

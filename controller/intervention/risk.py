@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from bridge.config.intervention import InterventionConfig
-from bridge.messages import FallHorizon, Floats
+from bridge.messages import STEPS, FallHorizon, Floats
 
 
 class Risk(NamedTuple):
@@ -17,6 +18,23 @@ class Risk(NamedTuple):
     by_distance: Floats
     by_approach: Floats
     by_probability: Floats
+
+
+def looked_at(horizon: FallHorizon, steps: int) -> FallHorizon:
+    """Return `horizon` as it is for who looks at its first `steps` (>= 1) alone: what lies beyond stays as the last.
+
+    Rates are those of what is left: the present alone has none.
+    """
+    if steps >= STEPS:
+        return horizon
+    index = np.minimum(np.arange(STEPS), steps - 1)
+    distance = horizon.distance[index]
+    return replace(
+        horizon,
+        distance=distance,
+        distance_rate=np.gradient(distance, horizon.step_s),
+        probabilities=horizon.probabilities[index],
+    )
 
 
 def ramp(value: Floats, onset: float, full: float) -> Floats:
