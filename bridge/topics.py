@@ -58,4 +58,4 @@ SUPPORT_COMMAND: Final = Topic(
 TWIST: Final = Topic("cmd_vel", SupportCommand, "geometry_msgs/msg/TwistStamped", "controller", 100, 0.060, CONTROL)
 DIAGNOSTICS: Final = Topic("diagnostics", NodeStatus, "diagnostic_msgs/msg/DiagnosticArray", "*", 5, 1.0, SAID)
 
-TOPICS: Final = (DETECTIONS, KEYPOINTS, FALL_HORIZON, WRENCH, ODOMETRY, SUPPORT_COMMAND, TWIST, DIAGNOSTICS)
+TOPICS: Final = (KEYPOINTS, FALL_HORIZON, WRENCH, ODOMETRY, SUPPORT_COMMAND, TWIST, DETECTIONS, DIAGNOSTICS)

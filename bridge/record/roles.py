@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from typing import Final
 
 from bridge.errors import ConfigError
-from bridge.topics import DETECTIONS, FALL_HORIZON, KEYPOINTS, ODOMETRY, SUPPORT_COMMAND, TOPICS, WRENCH, Topic
+from bridge.topics import FALL_HORIZON, KEYPOINTS, ODOMETRY, SUPPORT_COMMAND, TOPICS, WRENCH, Topic
 
 INPUTS: Final[dict[str, tuple[Topic, ...]]] = {  # in the order in which a message passes through the roles
-    "perception": (DETECTIONS,),
+    "perception": (),
     "anticipation": (KEYPOINTS,),
     "controller": (FALL_HORIZON, WRENCH, ODOMETRY),
     "drive": (SUPPORT_COMMAND,),

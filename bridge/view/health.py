@@ -43,7 +43,7 @@ _ROLE_COLOUR: Final = {
     "drive": "#7ccf7c",
 }
 _TOPIC_COLOUR: Final = dict(
-    zip((topic.key for topic in TOPICS), (FORECAST, TRANSIENT, FALL, "#7ccf7c", "#b98bdc", "", FAINT), strict=True)
+    zip((topic.key for topic in TOPICS), (FORECAST, TRANSIENT, FALL, "#7ccf7c", "#b98bdc", "", FORECAST, FAINT), strict=True)
 )
 
 

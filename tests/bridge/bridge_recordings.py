@@ -23,6 +23,7 @@ from bridge.messages import (
 )
 from bridge.record.writer import BagWriter
 from bridge.topics import (
+    DETECTIONS,
     DIAGNOSTICS,
     FALL_HORIZON,
     KEYPOINTS,
@@ -113,7 +114,7 @@ def command(stamp_ns: int, sequence: int = 0) -> SupportCommand:
 
 def _message(topic: Topic, stamp_ns: int, sequence: int, role: str) -> Message:
     time_s = (stamp_ns - START_NS) / NS
-    if topic == KEYPOINTS:
+    if topic in (DETECTIONS, KEYPOINTS):
         return keypoints(stamp_ns, sequence)
     if topic == FALL_HORIZON:
         return horizon(stamp_ns, sequence)

@@ -62,7 +62,7 @@ def check_values(topic: str, raw: Any) -> None:
     assert raw.header.stamp.sec * 10**9 + raw.header.stamp.nanosec == sent.stamp_ns
     assert raw.header.frame_id == sent.frame_id
     match event.topic.key:
-        case "keypoints":
+        case "keypoints" | "detections":
             assert np.array_equal(np.reshape(raw.position_px, (12, 2)), sent.position_px)
             assert list(raw.status) == sent.status.tolist()
             assert (raw.image_width, raw.people, raw.body_length_px) == (320, 1, 150.0)
@@ -128,6 +128,7 @@ def test_rosbags_reads_a_recording_with_the_definitions_inside(bag: Path) -> Non
 
 
 IDL: dict[str, Any] = {
+    "detections": KeypointsIdl,
     "keypoints": KeypointsIdl,
     "fall_horizon": FallHorizonIdl,
     "wrench": WrenchStampedIdl,
