@@ -1,6 +1,6 @@
 """One safetensors file with everything a predictor needs, described by a JSON header. No pickle.
 
-    forecaster/...   classifier/...    network parameters
+    forecaster/...   classifier/...   outlook/...    network parameters; there may be no outlook
     plane/...        statistics/...    arrays of the transient plane and of the training poses
     temperature                        (16,) calibration, one per step
 
@@ -26,17 +26,20 @@ from safetensors.torch import save as to_bytes
 from torch import Tensor, nn
 
 from anticipation.gait_state import CLASSIFIERS, DirectedGraphNetwork
+from anticipation.mirror import mirrored
 from anticipation.motion import BASELINES, FORECASTERS, HORIZON, WINDOW, Forecast
+from anticipation.outlook import Outlook
 from anticipation.quality import PoseStatistics
 from anticipation.transient import TransientPlane
 from bridge.errors import CheckpointError
 from bridge.messages import CLASSES, STEPS, Floats, frozen
 from perception.skeleton import NAMES
 
-FORMAT: Final = 1
+FORMAT: Final = 2  # 1 knew nothing of the centre's velocity
 SHIPPED: Final = Path(__file__).parent / "weights" / "default.safetensors"
 _HEADER: Final = "surefoot"
-_NETWORKS: Final = ("forecaster", "classifier")
+_NETWORKS: Final = ("forecaster", "classifier", "outlook")
+_OUTLOOKS: Final = {"outlook": Outlook}
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,8 @@ class Checkpoint:
     statistics: PoseStatistics
     temperature: Floats  # (16,) logits of step k are divided by temperature[k]
     provenance: Provenance = Provenance()
+    outlook: Outlook | None = None  # its logits are averaged with the classifier's
+    mirrored: bool = True  # and all logits with those of the mirrored motion
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "temperature", frozen(self.temperature, (STEPS,), "temperature"))
@@ -69,6 +74,19 @@ class Checkpoint:
     def forecast(self) -> Forecast:
         """The forecaster as a function (B, 15, 12, 2) -> (B, 15, 12, 2)."""
         return BASELINES[self.forecaster] if isinstance(self.forecaster, str) else self.forecaster
+
+    def logits(self, window: Tensor) -> Tensor:
+        """Return what a `Predictor` makes of windows (B, 15, 13, 2) before the temperatures: logits (B, 16, 3).
+
+        The mean of what the classifier says of the windows foreseen and, if there is one, of what the outlook says;
+        of the motion and, with `mirrored`, of its mirror image.
+        """
+        said = []
+        for side in (window, mirrored(window)) if self.mirrored else (window,):
+            said.append(self.classifier(torch.cat((side, self.forecast(side)), dim=1)))
+            if self.outlook is not None:
+                said.append(self.outlook(side))
+        return torch.stack(said).mean(dim=0)
 
 
 def save(checkpoint: Checkpoint, path: Path, storage: Literal["float16", "float32"] = "float16") -> None:
@@ -86,6 +104,7 @@ def save(checkpoint: Checkpoint, path: Path, storage: Literal["float16", "float3
         "keypoints": list(NAMES),
         "window": WINDOW,
         "horizon": HORIZON,
+        "mirrored": checkpoint.mirrored,
         "plane": {"features": checkpoint.plane.features},
         "data": list(checkpoint.provenance.data),
         "licence": checkpoint.provenance.licence,
@@ -94,7 +113,7 @@ def save(checkpoint: Checkpoint, path: Path, storage: Literal["float16", "float3
     }
     for part in _NETWORKS:
         network = getattr(checkpoint, part)
-        header[part] = _describe(network)
+        header[part] = None if network is None else _describe(network)
         if isinstance(network, nn.Module):
             tensors |= {f"{part}/{name}": _stored(value, storage) for name, value in network.state_dict().items()}
     write_whole(path, to_bytes(tensors, metadata={_HEADER: json.dumps(header)}))
@@ -123,6 +142,8 @@ def load(path: Path | None = None) -> Checkpoint:
             statistics=PoseStatistics.from_arrays(_arrays(tensors, "statistics")),
             temperature=tensors["temperature"].double().numpy(),
             provenance=Provenance(tuple(header["data"]), header["licence"], header["protocol"], header["metrics"]),
+            outlook=_built(header["outlook"], _OUTLOOKS, _part(tensors, "outlook")) if header["outlook"] else None,
+            mirrored=bool(header["mirrored"]),
         )
     except KeyError as error:
         raise CheckpointError(f"{path}: {error} is missing or not known to this version") from None
@@ -147,7 +168,9 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
         raise CheckpointError(f"{path}: header is not JSON ({error})") from None
     if not isinstance(header, dict) or header.get("format") != FORMAT:
         found = header.get("format") if isinstance(header, dict) else None
-        raise CheckpointError(f"{path}: checkpoint format is {found}, this version reads {FORMAT}")
+        raise CheckpointError(
+            f"{path}: checkpoint format is {found}, this version reads {FORMAT}: make it again with `surefoot train`"
+        )
     return header, tensors
 
 
@@ -159,7 +182,7 @@ def _require(path: Path, header: Mapping[str, Any], name: str, expected: object)
 def _describe(network: nn.Module | str) -> dict[str, Any]:
     if isinstance(network, str):
         return {"name": network}
-    for name, kind in (*FORECASTERS.items(), *CLASSIFIERS.items()):
+    for name, kind in (*FORECASTERS.items(), *CLASSIFIERS.items(), *_OUTLOOKS.items()):
         if type(network) is kind:
             return {"name": name, "settings": network.settings}
     raise ValueError(f"{type(network).__name__} is not a registered network")

@@ -23,7 +23,7 @@ class Judgement(NamedTuple):
 
 
 class FastDirectedGraph:
-    """`DirectedGraphNetwork` in evaluation mode for one sequence: (1, T, 12, C) -> `Judgement`.
+    """`DirectedGraphNetwork` in evaluation mode for one sequence: (1, T, 13, 2) -> `Judgement`.
 
     It keeps copies of the weights: later training does not reach it.
 
@@ -33,6 +33,7 @@ class FastDirectedGraph:
     def __init__(self, network: DirectedGraphNetwork) -> None:
         with torch.no_grad():
             source, target = incidence(torch.stack((network.source, network.target), dim=1).numpy())
+            self._entering = network.entering
             self._bones = (target - source).T.contiguous()  # (E, V)
             norms = [_affine(norm) for norm in (network.vertex_norm, network.edge_norm)]
             self._scale = torch.stack([scale for scale, _ in norms])[:, None, None]  # (2, 1, 1, C)
@@ -41,8 +42,8 @@ class FastDirectedGraph:
             self._bias, self._head = network.head.bias.clone(), network.head.weight.T.contiguous()
 
     def __call__(self, frames: Tensor) -> Judgement:
-        """Judge every window of frames (1, T, 12, C)."""
-        vertices = frames[0].transpose(0, 1).contiguous()  # (12, T, C)
+        """Judge every window of frames (1, T, 13, 2)."""
+        vertices = self._entering(frames)[0].transpose(0, 1).contiguous()  # (12, T, C)
         edges = (self._bones @ vertices.flatten(1)).view_as(vertices)
         X = torch.addcmul(self._shift, torch.stack((vertices, edges)), self._scale)
         for block in self._blocks:

@@ -12,20 +12,34 @@ import torch
 from torch import Tensor, nn
 from torch.nn.functional import gelu, layer_norm
 
-from anticipation.motion import COORDINATES, HORIZON, DctMlpForecaster, Forecast, LstmForecaster, MixerBlock
+from anticipation.motion import (
+    COORDINATES,
+    HORIZON,
+    INPUT_GAIN,
+    DctMlpForecaster,
+    Forecast,
+    LstmForecaster,
+    MixerBlock,
+    MlpForecaster,
+    ResidualBlock,
+    with_centre,
+)
+from bridge.messages import KEYPOINTS
 
 
 def fast_forecast(forecaster: Forecast) -> Forecast:
-    """Return a quicker equal of `forecaster` for windows (1, 15, 12, 2), or itself if there is none."""
+    """Return a quicker equal of `forecaster` for windows (1, 15, 13, 2), or itself if there is none."""
     if isinstance(forecaster, LstmForecaster):
         return FastLstm(forecaster)
     if isinstance(forecaster, DctMlpForecaster):
         return FastDctMlp(forecaster)
+    if isinstance(forecaster, MlpForecaster):
+        return FastMlp(forecaster)
     return forecaster
 
 
 class FastLstm:
-    """`LstmForecaster` in evaluation mode for one window: (1, 15, 12, 2) -> (1, 15, 12, 2).
+    """`LstmForecaster` in evaluation mode for one window: (1, 15, 13, 2) -> (1, 15, 13, 2).
 
     Matrix-vector products instead of the general recurrent kernels, whose set-up costs more than a step;
     a layer's input products are taken for the whole window at once.
@@ -51,14 +65,14 @@ class FastLstm:
         self._residual = network.residual
 
     def __call__(self, window: Tensor) -> Tensor:
-        """Forecast (1, 15, 12, 2) from a window (1, 15, 12, 2)."""
-        poses = window.reshape(-1, COORDINATES)  # (15, 24)
+        """Forecast (1, 15, 13, 2) from a window (1, 15, 13, 2)."""
+        poses = window[0, :, :KEYPOINTS].reshape(-1, COORDINATES)  # (15, 24)
         state = [(window.new_zeros(self._hidden), window.new_zeros(self._hidden)) for _ in self._layers]
         hidden = self._advance(poses, state)
         last = poses[-1]
         if not self._rollout:
             future = torch.addmv(self._bias, self._head, hidden).view(HORIZON, COORDINATES)
-            return (future + last if self._residual else future).view(window.shape)
+            return _frames(future + last if self._residual else future, window)
         futures = []
         for step in range(HORIZON):
             if step:
@@ -66,7 +80,7 @@ class FastLstm:
             pose = torch.addmv(self._bias, self._head, hidden)
             last = last + pose if self._residual else pose
             futures.append(last)
-        return torch.stack(futures).view(window.shape)
+        return _frames(torch.stack(futures), window)
 
     def _advance(self, inputs: Tensor, state: list[tuple[Tensor, Tensor]]) -> Tensor:
         """Feed inputs (S, 24), update `state` in place and return the last layer's newest hidden vector."""
@@ -94,7 +108,7 @@ class _Layer(NamedTuple):
 
 
 class FastDctMlp:
-    """`DctMlpForecaster` in evaluation mode for one window: (1, 15, 12, 2) -> (1, 15, 12, 2)."""
+    """`DctMlpForecaster` in evaluation mode for one window: (1, 15, 13, 2) -> (1, 15, 13, 2)."""
 
     def __init__(self, network: DctMlpForecaster) -> None:
         with torch.no_grad():
@@ -104,8 +118,8 @@ class FastDctMlp:
             self._blocks = [_Mixer.of(cast(MixerBlock, block)) for block in network.blocks]
 
     def __call__(self, window: Tensor) -> Tensor:
-        """Forecast (1, 15, 12, 2) from a window (1, 15, 12, 2)."""
-        poses = window.reshape(-1, COORDINATES)  # (15, 24)
+        """Forecast (1, 15, 13, 2) from a window (1, 15, 13, 2)."""
+        poses = window[0, :, :KEYPOINTS].reshape(-1, COORDINATES)  # (15, 24)
         bias, weight = self._enter
         x = torch.addmm(bias, self._basis @ poses, weight)  # (15, width)
         shape = x.shape[1:]
@@ -114,7 +128,53 @@ class FastDctMlp:
             mixed = torch.addmm(block.space_bias, layer_norm(x, shape, *block.norm_space), block.space)
             x.add_(gelu(mixed))
         bias, weight = self._leave
-        return torch.addmm(poses[-1], self._basis.T, torch.addmm(bias, x, weight)).view(window.shape)
+        return _frames(torch.addmm(poses[-1], self._basis.T, torch.addmm(bias, x, weight)), window)
+
+
+class FastMlp:
+    """`MlpForecaster` in evaluation mode for one window: (1, 15, 13, 2) -> (1, 15, 13, 2)."""
+
+    def __init__(self, network: MlpForecaster) -> None:
+        with torch.no_grad():
+            self._enter = INPUT_GAIN * network.enter.weight, network.enter.bias.clone()
+            self._leave = network.leave.weight.clone(), network.leave.bias.clone()
+            self._blocks = [_Residual.of(cast(ResidualBlock, block)) for block in network.blocks]
+
+    def __call__(self, window: Tensor) -> Tensor:
+        """Forecast (1, 15, 13, 2) from a window (1, 15, 13, 2)."""
+        frames = window.view(HORIZON, -1)  # (15, 26)
+        weight, bias = self._enter
+        x = torch.addmv(bias, weight, torch.cat((frames[:-1] - frames[-1], frames[-1:])).view(-1))
+        for block in self._blocks:
+            added = torch.addmv(block.first_bias, block.first, layer_norm(x, x.shape, *block.norm))
+            x = x + torch.addmv(block.second_bias, block.second, gelu(added))
+        weight, bias = self._leave
+        return (torch.addmv(bias, weight, x).view_as(frames) + frames[-1]).view(window.shape)
+
+
+class _Residual(NamedTuple):
+    """One `ResidualBlock`; the norm as (weight, bias)."""
+
+    norm: tuple[Tensor, Tensor]
+    first: Tensor  # (width, width)
+    first_bias: Tensor  # (width,)
+    second: Tensor  # (width, width)
+    second_bias: Tensor  # (width,)
+
+    @classmethod
+    def of(cls, block: ResidualBlock) -> _Residual:
+        return cls(
+            (block.norm.weight.clone(), block.norm.bias.clone()),
+            block.first.weight.clone(),
+            block.first.bias.clone(),
+            block.second.weight.clone(),
+            block.second.bias.clone(),
+        )
+
+
+def _frames(poses: Tensor, window: Tensor) -> Tensor:
+    """Foreseen poses (15, 24) as frames (1, 15, 13, 2), with the centre going on as it went."""
+    return with_centre(poses.view(1, HORIZON, KEYPOINTS, 2), window)
 
 
 class _Mixer(NamedTuple):

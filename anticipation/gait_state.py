@@ -143,10 +143,12 @@ class DirectedGraphBlock(nn.Module):
 
 
 class DirectedGraphNetwork(nn.Module):
-    """Gait state of every window of 15 frames: (B, T, 12, in_channels) -> logits (B, T - 14, 3).
+    """Gait state of every window of 15 frames: (B, T, 13, 2) -> logits (B, T - 14, 3).
 
-    Input are coordinates relative to the upper-body centre in body lengths (and, with more than two channels,
-    further streams per keypoint); edges are the bone vectors, target minus source, of every channel.
+    Vertices are the keypoints relative to the upper-body centre in body lengths; edges are the bone vectors, target
+    minus source. With `centre` every vertex also has the centre's velocity through the image, row 12 of a frame, as
+    two more channels: relative coordinates alone do not say that the body descends. Without it, as in the paper, rows
+    beyond the keypoints are not looked at.
     Logits are in the order stable, transient, fall; entry t belongs to frames t .. t + 14.
     """
 
@@ -155,7 +157,7 @@ class DirectedGraphNetwork(nn.Module):
 
     def __init__(
         self,
-        in_channels: int = 2,
+        centre: bool = False,
         widths: Sequence[int] = (16, 32, 64),
         kernels: Sequence[int] = (5, 5, 7),
         dropout: float = 0.5,
@@ -166,8 +168,10 @@ class DirectedGraphNetwork(nn.Module):
         if reach != WINDOW or len(kernels) != len(widths):
             raise ValueError(f"kernels {tuple(kernels)} see {reach} frames in {len(widths)} blocks, expected {WINDOW}")
         self.settings: Settings = {
-            "in_channels": in_channels, "widths": list(widths), "kernels": list(kernels), "dropout": dropout,
+            "centre": centre, "widths": list(widths), "kernels": list(kernels), "dropout": dropout,
         }  # fmt: skip
+        self.centre = centre
+        in_channels = 4 if centre else 2
         ends = torch.tensor(np.array(links, dtype=np.int64))
         self.register_buffer("source", ends[:, 0].clone(), persistent=False)
         self.register_buffer("target", ends[:, 1].clone(), persistent=False)
@@ -187,16 +191,24 @@ class DirectedGraphNetwork(nn.Module):
             if name.endswith(("source_offset", "target_offset")):
                 parameter.requires_grad_(trainable)
 
+    def entering(self, frames: Tensor) -> Tensor:
+        """What enters at the vertices: frames (B, T, 13, 2) -> (B, T, 12, 2), or (B, T, 12, 4) with the centre."""
+        poses = frames[:, :, :VERTICES]
+        if not self.centre:
+            return poses
+        return torch.cat((poses, frames[:, :, VERTICES:].expand_as(poses)), dim=-1)
+
     def embedding(self, frames: Tensor) -> Tensor:
-        """Mean over vertices beside mean over edges after the last block: (B, T, 12, C) -> (B, T - 14, 128)."""
-        bones = frames[:, :, self.target] - frames[:, :, self.source]  # (B, T, E, C)
-        vertices, edges = self.vertex_norm(frames), self.edge_norm(bones)
+        """Mean over vertices beside mean over edges after the last block: (B, T, 13, 2) -> (B, T - 14, 128)."""
+        entering = self.entering(frames)  # (B, T, V, C)
+        bones = entering[:, :, self.target] - entering[:, :, self.source]  # (B, T, E, C)
+        vertices, edges = self.vertex_norm(entering), self.edge_norm(bones)
         for block in self.blocks:
             vertices, edges = block(vertices, edges)
         return torch.cat((vertices.mean(dim=2), edges.mean(dim=2)), dim=-1)
 
     def forward(self, frames: Tensor) -> Tensor:
-        """Logits (B, T - 14, 3) of frames (B, T, 12, C), T >= 15."""
+        """Logits (B, T - 14, 3) of frames (B, T, 13, 2), T >= 15."""
         logits: Tensor = self.head(self.dropout(self.embedding(frames)))
         return logits
 

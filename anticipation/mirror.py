@@ -7,10 +7,10 @@ from torch import Tensor
 
 from perception.skeleton import MIRROR
 
-_SWAP = torch.from_numpy(MIRROR.copy()).long()
+_SWAP = torch.cat((torch.from_numpy(MIRROR.copy()).long(), torch.tensor([len(MIRROR)])))  # the centre stays
 _FLIP = torch.tensor([-1.0, 1.0])
 
 
 def mirrored(poses: Tensor) -> Tensor:
-    """Return relative poses (..., 12, 2) with x negated and left and right keypoints exchanged."""
-    return poses[..., _SWAP, :] * _FLIP
+    """Return frames (..., 13, 2), or poses (..., 12, 2), with x negated and left and right keypoints exchanged."""
+    return poses[..., _SWAP[: poses.shape[-2]], :] * _FLIP

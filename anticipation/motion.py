@@ -1,7 +1,9 @@
-"""Forecasts of human motion: the last half second of relative coordinates in, the next half second out.
+"""Forecasts of human motion: the last half second in, the next half second out.
 
-Every forecaster maps (B, 15, 12, 2) to (B, 15, 12, 2): coordinates relative to the upper-body
-centre in body lengths, one frame every 1/30 s, output frame k being k + 1 steps after the last input frame.
+Every forecaster maps (B, 15, 13, 2) to (B, 15, 13, 2), one frame every 1/30 s, output frame k being k + 1 steps after
+the last input frame. Rows 0..11 of a frame are the keypoints relative to the upper-body centre in body lengths, row 12
+is that centre's velocity through the image (`anticipation.centre`). The forecasts that know of coordinates alone, the
+paper's among them, let the centre go on as it went, and take frames of 12 rows too.
 """
 
 from __future__ import annotations
@@ -13,9 +15,13 @@ from typing import Final, Literal, TypeAlias, get_args
 import torch
 from torch import Tensor, nn
 
+from bridge.messages import KEYPOINTS
+
 WINDOW: Final = 15  # frames a forecaster and the classifier see (paper, Table 1)
 HORIZON: Final = 15  # frames foreseen: half a second at 30 Hz
 COORDINATES: Final = 24  # 12 keypoints, x and y
+INPUT_GAIN: Final = 4.0  # brings displacements of a tenth of a body length to the scale of the first layer
+ROWS: Final = KEYPOINTS + 1  # of a frame: keypoints, and the centre's velocity
 
 Forecast: TypeAlias = Callable[[Tensor], Tensor]
 Settings: TypeAlias = Mapping[str, bool | int | float | str | list[int]]
@@ -23,14 +29,21 @@ Mode: TypeAlias = Literal["direct", "rollout"]
 
 
 def zero_velocity(window: Tensor) -> Tensor:
-    """Hold the last pose: (B, 15, 12, 2) -> (B, 15, 12, 2)."""
-    return window[:, -1:].expand(-1, HORIZON, -1, -1)
+    """Hold the last pose: (B, 15, 13, 2) -> (B, 15, 13, 2)."""
+    return with_centre(window[:, -1:, :KEYPOINTS].expand(-1, HORIZON, -1, -1), window)
 
 
 def constant_velocity(window: Tensor) -> Tensor:
-    """Continue the slope of the last three frames: (B, 15, 12, 2) -> (B, 15, 12, 2)."""
+    """Continue the slope of the last three frames: (B, 15, 13, 2) -> (B, 15, 13, 2)."""
     steps = torch.arange(1, HORIZON + 1, device=window.device, dtype=window.dtype).reshape(1, -1, 1, 1)
-    return window[:, -1:] + steps * (window[:, -1:] - window[:, -3:-2]) / 2
+    poses = window[:, :, :KEYPOINTS]
+    return with_centre(poses[:, -1:] + steps * (poses[:, -1:] - poses[:, -3:-2]) / 2, window)
+
+
+def with_centre(poses: Tensor, window: Tensor) -> Tensor:
+    """Give foreseen poses (B, 15, 12, 2) a centre that goes on at the velocity of the window's last three frames."""
+    velocity = window[:, -2:, KEYPOINTS:].mean(dim=1, keepdim=True)  # (B, 1, 1, 2): two steps between three frames
+    return torch.cat((poses, velocity.expand(-1, HORIZON, -1, -1)), dim=2)
 
 
 class LstmForecaster(nn.Module):
@@ -63,13 +76,13 @@ class LstmForecaster(nn.Module):
                 nn.init.zeros_(parameter)
 
     def forward(self, window: Tensor) -> Tensor:
-        """Forecast (B, 15, 12, 2) from a window (B, 15, 12, 2)."""
-        poses = window.flatten(2)  # (B, 15, 24)
+        """Forecast (B, 15, 13, 2) from a window (B, 15, 13, 2)."""
+        poses = window[:, :, :KEYPOINTS].flatten(2)  # (B, 15, 24)
         hidden, state = self.lstm(poses)  # (B, 15, 512)
         last = poses[:, -1:]  # (B, 1, 24)
         if self.mode == "direct":
             future: Tensor = self.head(self.dropout(hidden[:, -1])).reshape(-1, HORIZON, COORDINATES)
-            return (future + last if self.residual else future).reshape(window.shape)
+            return with_centre((future + last if self.residual else future).view(-1, HORIZON, KEYPOINTS, 2), window)
         futures = []
         newest = hidden[:, -1:]  # (B, 1, 512)
         for step in range(HORIZON):
@@ -78,7 +91,7 @@ class LstmForecaster(nn.Module):
             pose = self.head(self.dropout(newest))  # (B, 1, 24)
             last = last + pose if self.residual else pose
             futures.append(last)
-        return torch.cat(futures, dim=1).reshape(window.shape)
+        return with_centre(torch.cat(futures, dim=1).view(-1, HORIZON, KEYPOINTS, 2), window)
 
 
 def cosine_basis(frames: int) -> Tensor:
@@ -110,13 +123,13 @@ class DctMlpForecaster(nn.Module):
         nn.init.zeros_(self.leave.bias)
 
     def forward(self, window: Tensor) -> Tensor:
-        """Forecast (B, 15, 12, 2) from a window (B, 15, 12, 2)."""
-        poses = window.flatten(2)  # (B, 15, 24)
+        """Forecast (B, 15, 13, 2) from a window (B, 15, 13, 2)."""
+        poses = window[:, :, :KEYPOINTS].flatten(2)  # (B, 15, 24)
         x = self.enter(self.basis @ poses)  # (B, 15, width)
         for block in self.blocks:
             x = block(x)
         future: Tensor = self.basis.T @ self.leave(x)  # (B, 15, 24)
-        return (future + poses[:, -1:]).reshape(window.shape)
+        return with_centre((future + poses[:, -1:]).view(-1, HORIZON, KEYPOINTS, 2), window)
 
 
 class MixerBlock(nn.Module):
@@ -137,7 +150,54 @@ class MixerBlock(nn.Module):
         return mixed
 
 
-FORECASTERS: Final[Mapping[str, Callable[..., nn.Module]]] = {"lstm": LstmForecaster, "dct_mlp": DctMlpForecaster}
+class MlpForecaster(nn.Module):
+    """A residual MLP over all numbers of a window, the centre's velocity among them.
+
+    The frames enter as displacements from the last, and the last as it is; the result is added to the last frame. The
+    last layer starts at zero: an untrained network holds the last pose and lets the centre go on.
+    """
+
+    def __init__(self, width: int = 256, blocks: int = 2, dropout: float = 0.2) -> None:
+        super().__init__()
+        self.settings: Settings = {"width": width, "blocks": blocks, "dropout": dropout}
+        self.enter = nn.Linear(WINDOW * ROWS * 2, width)
+        self.blocks = nn.ModuleList(ResidualBlock(width, dropout) for _ in range(blocks))
+        self.leave = nn.Linear(width, HORIZON * ROWS * 2)
+        nn.init.zeros_(self.leave.weight)
+        nn.init.zeros_(self.leave.bias)
+
+    def forward(self, window: Tensor) -> Tensor:
+        """Forecast (B, 15, 13, 2) from a window (B, 15, 13, 2)."""
+        frames = window.flatten(2)  # (B, 15, 26)
+        last = frames[:, -1:]
+        x = self.enter(INPUT_GAIN * torch.cat((frames[:, :-1] - last, last), dim=1).flatten(1))  # (B, width)
+        for block in self.blocks:
+            x = block(x)
+        future: Tensor = self.leave(x).view(-1, HORIZON, ROWS * 2) + last  # (B, 15, 26)
+        return future.view(-1, HORIZON, ROWS, 2)
+
+
+class ResidualBlock(nn.Module):
+    """Norm, two layers, and what came in: (B, width) -> the same."""
+
+    def __init__(self, width: int, dropout: float) -> None:
+        super().__init__()
+        self.norm = nn.LayerNorm(width)
+        self.first = nn.Linear(width, width)
+        self.dropout = nn.Dropout(dropout)
+        self.second = nn.Linear(width, width)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Add what two layers make of (B, width)."""
+        added: Tensor = x + self.second(self.dropout(nn.functional.gelu(self.first(self.norm(x)))))
+        return added
+
+
+FORECASTERS: Final[Mapping[str, Callable[..., nn.Module]]] = {
+    "lstm": LstmForecaster,
+    "dct_mlp": DctMlpForecaster,
+    "mlp": MlpForecaster,
+}
 """Learned forecasters by the name a checkpoint carries; the constructor takes the module's `settings`."""
 
 BASELINES: Final[Mapping[str, Forecast]] = {"zero_velocity": zero_velocity, "constant_velocity": constant_velocity}

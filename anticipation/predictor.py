@@ -9,16 +9,18 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from anticipation.centre import SPAN_S, path
 from anticipation.checkpoint import Checkpoint, load
 from anticipation.fast_gait_state import FastDirectedGraph
 from anticipation.fast_motion import fast_forecast
 from anticipation.mirror import mirrored
-from anticipation.motion import BASELINES, COORDINATES, HORIZON, WINDOW
+from anticipation.motion import BASELINES, COORDINATES, HORIZON, ROWS, WINDOW
+from anticipation.outlook import FastOutlook
 from anticipation.quality import Quality, judge
 from anticipation.transient import fold
 from anticipation.window import PoseWindow
 from bridge.config.anticipation import AnticipationConfig
-from bridge.messages import CLASSES, KEYPOINTS, STEP_S, STEPS, FallHorizon, Floats, Keypoints
+from bridge.messages import CLASSES, KEYPOINTS, STEPS, FallHorizon, Floats, Keypoints
 
 _STABLE: Final = CLASSES.index("stable")
 _TRANSIENT: Final = CLASSES.index("transient")
@@ -28,7 +30,8 @@ class Predictor:
     """Keeps a person's last half second and foresees the next.
 
     One window is forecast, and one pass of the classifier over the 15 frames seen and the 15 foreseen judges
-    the sixteen windows that end at steps 0..15; the same is done with its mirror image, and the logits are averaged.
+    the sixteen windows that end at steps 0..15; the outlook, if the checkpoint has one, judges the steps from the
+    window seen. The same is done with its mirror image, and all logits are averaged (`Checkpoint.logits`).
     """
 
     def __init__(self, checkpoint: Checkpoint, config: AnticipationConfig) -> None:
@@ -39,9 +42,10 @@ class Predictor:
         own = config.forecaster == "checkpoint"
         self._forecast = fast_forecast(checkpoint.forecast if own else BASELINES[config.forecaster])
         self._classify = FastDirectedGraph(checkpoint.classifier)
+        self._outlook = None if checkpoint.outlook is None else FastOutlook(checkpoint.outlook)
+        self._mirrored = checkpoint.mirrored
         self._window = PoseWindow(config, checkpoint.statistics.mean_pose)
-        self._frames = torch.zeros(1, WINDOW + HORIZON, KEYPOINTS, 2)
-        self._ahead = np.arange(STEPS)[:, None]
+        self._frames = torch.zeros(1, WINDOW + HORIZON, ROWS, 2)
 
     @classmethod
     def from_config(cls, config: AnticipationConfig) -> Self:
@@ -64,7 +68,8 @@ class Predictor:
     def warm_up(self) -> None:
         """Run the networks a few times, so that the first real step is as quick as the later ones."""
         for _ in range(5):
-            self._run(np.repeat(self._statistics.mean_pose[None], WINDOW, axis=0).astype(np.float32))
+            still = np.concatenate((self._statistics.mean_pose, np.zeros((1, 2)))).astype(np.float32)
+            self._run(np.repeat(still[None], WINDOW, axis=0))
 
     def push(self, keypoints: Keypoints) -> None:
         """Take in the next tick; one that is not newer than the last is ignored."""
@@ -86,7 +91,7 @@ class Predictor:
         if quality.total < self._config.min_quality:
             reason = f"quality is {quality.total:.2f}, limit {self._config.min_quality:.2f}: {quality.cause}"
             return invalid_horizon(window.stamp_ns, reason, quality.total)
-        frames, logits, features = self._run(window.relative)
+        frames, logits, features = self._run(window.rows)
         transition = self._plane.transition(features)
         return FallHorizon(
             stamp_ns=window.stamp_ns,
@@ -101,22 +106,26 @@ class Predictor:
         )
 
     def _run(self, window: NDArray[np.float32]) -> tuple[Floats, Floats, Floats]:
-        """Return 30 relative poses (30, 12, 2), logits (16, 3) and the plane's features (16, D) of a window."""
+        """Return 30 frames (30, 13, 2), logits (16, 3) and the plane's features (16, D) of a window (15, 13, 2)."""
         with torch.inference_mode():
             self._frames[0, :WINDOW] = torch.from_numpy(window)
             self._frames[:, WINDOW:] = self._forecast(self._frames[:, :WINDOW])
             judgement = self._classify(self._frames)
-            # The networks were not made symmetric; the mean with the mirror image is, and errs less.
-            seen = mirrored(self._frames[:, :WINDOW])
-            reflection = self._classify(torch.cat((seen, self._forecast(seen)), dim=1))
+            logits, sides = judgement.logits, self._frames[:, :WINDOW]
+            if self._mirrored:  # the networks were not made symmetric; the mean with the mirror image is, and errs less
+                reflected = mirrored(sides)
+                reflection = self._classify(torch.cat((reflected, self._forecast(reflected)), dim=1))
+                logits, sides = 0.5 * (logits + reflection.logits), torch.cat((sides, reflected))
+            if self._outlook is not None:
+                logits = 0.5 * (logits + self._outlook(sides).mean(dim=0))
             if self._plane.features == "embedding":
                 features = judgement.embedding
             else:  # every window is a stretch of the flattened frames
                 plain = self._plane.features == "window"
-                poses = self._frames if plain else torch.from_numpy(fold(self._frames.numpy()))
+                poses = self._frames[0, :, :KEYPOINTS]
+                poses = poses if plain else torch.from_numpy(fold(poses.numpy()))
                 features = poses.flatten().unfold(0, WINDOW * COORDINATES, COORDINATES)
-            frames, logits = self._frames[0], 0.5 * (judgement.logits + reflection.logits)
-            return frames.double().numpy(), logits.double().numpy(), features.double().numpy()
+            return self._frames[0].double().numpy(), logits.double().numpy(), features.double().numpy()
 
     def _probabilities(self, logits: Floats, quality: Quality) -> Floats:
         """Calibrated probabilities (16, 3).
@@ -132,17 +141,18 @@ class Predictor:
         probabilities[:, _TRANSIENT] += excess
         return probabilities
 
-    def _in_image(self, poses: Floats) -> Floats:
-        """Relative poses (16, 12, 2) of steps 0..15 in the image [px].
+    def _in_image(self, frames: Floats) -> Floats:
+        """Keypoints (16, 12, 2) of steps 0..15 in the image [px], from frames (16, 13, 2).
 
-        The body's centre goes on at the velocity of its last three ticks, as far as people can be that fast.
+        The body's centre goes the way that was foreseen for it, as far as people can be that fast.
         """
-        centre_px, length_px = self._window.centre_px, self._window.body_length_px
-        velocity = (centre_px[-1] - centre_px[-3]) / 2.0  # [px/tick]
-        fastest = self._config.max_centre_speed_body_lengths_s * length_px * STEP_S
-        velocity *= min(1.0, fastest / max(float(np.hypot(*velocity)), 1e-9))
-        centres = centre_px[-1] + self._ahead * velocity  # (16, 2)
-        foreseen_px: Floats = poses * length_px + centres[:, None]
+        length_px = self._window.body_length_px
+        velocity = frames[1:, KEYPOINTS]  # (15, 2)
+        fastest = self._config.max_centre_speed_body_lengths_s * SPAN_S
+        speed = np.hypot(velocity[:, 0], velocity[:, 1])[:, None]
+        gone_px = path(velocity * np.minimum(1.0, fastest / np.maximum(speed, 1e-9)), length_px)
+        centres_px = self._window.centre_px[-1] + np.concatenate((np.zeros((1, 2)), gone_px))  # (16, 2)
+        foreseen_px: Floats = frames[:, :KEYPOINTS] * length_px + centres_px[:, None]
         return foreseen_px
 
 

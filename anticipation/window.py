@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from anticipation.motion import WINDOW
+from anticipation.centre import centre_velocity
+from anticipation.motion import ROWS, WINDOW
 from bridge.clock import nanoseconds
 from bridge.config.anticipation import AnticipationConfig
 from bridge.messages import KEYPOINTS, STEP_S, Bytes, Floats, Keypoints, KeypointStatus
@@ -15,7 +16,7 @@ _PERIOD_NS = nanoseconds(STEP_S)
 
 
 class PoseWindow:
-    """Fifteen ticks of relative coordinates, newest last.
+    """Fifteen ticks of relative coordinates and of the centre's velocity, newest last.
 
     A lost keypoint is held at its last place relative to the body for `hold_s`, then put at its average place.
     Ticks that are missing, not valid or without a body centre are filled on the line between
@@ -29,7 +30,8 @@ class PoseWindow:
         self._min_keypoints = config.min_keypoints
         self._min_body_length_px = config.min_body_length_px
         self._mean_pose = mean_pose
-        self.relative: NDArray[np.float32] = np.zeros((WINDOW, KEYPOINTS, 2), dtype=np.float32)  # [body lengths]
+        self.rows: NDArray[np.float32] = np.zeros((WINDOW, ROWS, 2), dtype=np.float32)  # what the networks read
+        self.relative = self.rows[:, :KEYPOINTS]  # [body lengths]
         self.status: Bytes = np.zeros((WINDOW, KEYPOINTS), dtype=np.uint8)  # KeypointStatus
         self.centre_px: Floats = np.zeros((WINDOW, 2))
         self.reset()
@@ -88,7 +90,11 @@ class PoseWindow:
         pose = self._complete(keypoints)
         status = np.where(np.isfinite(keypoints.position_px).all(axis=1), keypoints.status, KeypointStatus.LOST)
         before, centre_before = self.relative[-1].copy(), self.centre_px[-1].copy()
+        if self.frames == 0:
+            centre_before = np.full(2, np.nan)  # whoever was there before is no place to come from
+        velocity = centre_velocity(centre, centre_before, keypoints.body_length_px, missing + 1)
         self._shift(missing + 1)
+        self.rows[-missing - 1 :, KEYPOINTS] = velocity
         for tick in range(1, missing + 1):
             share = tick / (missing + 1)
             row = tick - missing - 2
@@ -108,7 +114,7 @@ class PoseWindow:
         return pose
 
     def _shift(self, ticks: int) -> None:
-        for rows in (self.relative, self.centre_px, self.status):
+        for rows in (self.rows, self.centre_px, self.status):
             rows[:-ticks] = rows[ticks:].copy()
         self.frames = min(WINDOW, self.frames + ticks)
 

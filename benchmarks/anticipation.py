@@ -25,7 +25,8 @@ from anticipation.checkpoint import SHIPPED, Checkpoint, load
 from anticipation.fast_gait_state import FastDirectedGraph
 from anticipation.fast_motion import fast_forecast
 from anticipation.gait_state import DirectedGraphNetwork
-from anticipation.motion import DctMlpForecaster, LstmForecaster
+from anticipation.motion import LstmForecaster, MlpForecaster
+from anticipation.outlook import Outlook
 from anticipation.predictor import Predictor
 from anticipation.quality import PoseStatistics
 from anticipation.transient import TransientPlane
@@ -62,8 +63,9 @@ def untrained() -> Checkpoint:
     """Networks of the shipped kind with random weights: they cost what trained ones cost."""
     random = np.random.default_rng(0)
     return Checkpoint(
-        forecaster=DctMlpForecaster().eval(),
-        classifier=DirectedGraphNetwork().eval(),
+        forecaster=MlpForecaster().eval(),
+        classifier=DirectedGraphNetwork(centre=True).eval(),
+        outlook=Outlook().eval(),
         plane=TransientPlane(
             "window", random.normal(0, 0.1, (360, 2)), np.zeros(2), np.eye(3, 2), np.eye(3, 2), np.zeros(3)
         ),
@@ -135,7 +137,7 @@ def measure(checkpoint: Checkpoint, times: int) -> dict[str, Any]:
     """Measure every part on one thread."""
     torch.set_num_threads(1)
     torch.manual_seed(0)
-    frames = torch.randn(1, 30, 12, 2)
+    frames = torch.randn(1, 30, 13, 2)
     window = frames[:, :15].contiguous()
     windows = torch.cat([frames[:, first : first + 15] for first in range(16)])
     lstm = LstmForecaster().eval()

@@ -7,7 +7,6 @@ import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import asdict
-from enum import StrEnum
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
@@ -25,20 +24,12 @@ from anticipation.training.journal import Journal
 from anticipation.training.log import Log, available
 from anticipation.training.networks import progress_bars
 from anticipation.training.own import read_own
-from anticipation.training.plan import Plan, plan_for
+from anticipation.training.plan import Plan, RecipeName, plan_for
 from anticipation.training.run import Run
 from anticipation.training.samples import Track
 from anticipation.training.team import Team, joined
 from bridge.config.perception import CleaningConfig
 from bridge.errors import SourceError, SurefootError
-
-
-class Forecaster(StrEnum):
-    """Forecasters that can be trained."""
-
-    LSTM = "lstm"
-    DCT_MLP = "dct_mlp"
-
 
 Data = Annotated[
     Path | None, typer.Option("--data", envvar="SUREFOOT_DATA", help="Folder of the research data.", show_default=False)
@@ -62,7 +53,9 @@ def train(
     out: Annotated[Path, typer.Option(help="Checkpoint to write (.safetensors).")] = Path("surefoot.safetensors"),
     own: Annotated[Path | None, typer.Option("--own", help="Folder of your own recordings to learn from too.")] = None,
     seed: Seed = 0,
-    forecaster: Annotated[Forecaster, typer.Option(help="Network that foresees the motion.")] = Forecaster.DCT_MLP,
+    recipe: Annotated[
+        RecipeName, typer.Option(help="Networks and how they learn: the shipped ones, or others.")
+    ] = RecipeName.SUREFOOT,
     epochs: Epochs = None,
     folds: Folds = 5,
     evaluated: Annotated[
@@ -89,7 +82,7 @@ def train(
             required(folder, file.path)
     measured = None if evaluated is None else production.read_evaluation(evaluated)
     _writable(out)
-    plan = plan_for(forecaster.value, seed, quick, epochs)
+    plan = plan_for(recipe, seed, quick, epochs)
     _one_thread()
     with joined(_device(device)) as (team, place):
         settings = _settings(plan, folds, seed, measured, own, team, place)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 import torch
@@ -21,6 +21,7 @@ from bridge.errors import SurefootError
 
 DECAY_EVERY: Final = 16  # epochs (paper, III.B)
 DECAY: Final = 0.3
+LOWEST: Final = 0.1  # share of the rate at which a cosine ends
 AVERAGED: Final = 0.4  # the last share of the epochs whose weights are averaged
 GRAPH_FROZEN: Final = 4  # epochs before the incidence may learn (Shi et al. 2019 freeze it at first)
 STEEPEST: Final = 5.0  # longest gradient that is followed
@@ -40,13 +41,16 @@ class Recipe:
     rate: float = 1e-3  # Adam's learning rate at the start (paper, III.B)
     seed: int = 0
     augmented: bool = True
+    noise: float = 1.0  # of the augmentation, in its own units
+    weight_decay: float = 0.0  # decoupled (Loshchilov and Hutter, ICLR 2019); 0 is plain Adam
+    schedule: Literal["step", "cosine"] = "step"  # the paper's steps, or down to a tenth along a cosine
 
 
 class Batch(NamedTuple):
     """This process's rows of a batch."""
 
     whole: int  # rows of all processes together
-    poses: Tensor  # (B, 30, 12, 2)
+    poses: Tensor  # (B, 30, 13, 2)
     known: Tensor  # (B, 30)
     labels: Tensor  # (B, 16)
 
@@ -69,7 +73,7 @@ class Fit(NamedTuple):
 def draw_batches(
     shares: SharesOfBatch, recipe: Recipe, generator: torch.Generator
 ) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
-    """Yield one epoch of (poses (B, 30, 12, 2), known (B, 30), labels (B, 16)).
+    """Yield one epoch of (poses (B, 30, 13, 2), known (B, 30), labels (B, 16)).
 
     Each source fills its share of every batch, so that batch norm sees the same mixture throughout.
     """
@@ -79,7 +83,7 @@ def draw_batches(
         for samples, share in shares:
             count = max(1, round(recipe.batch * share / total))
             index = torch.randint(len(samples), (count,), generator=generator).numpy()
-            poses.append(samples.poses[index])
+            poses.append(samples.frames[index])
             known.append(samples.known[index])
             labels.append(samples.labels[index])
         yield (
@@ -119,8 +123,10 @@ class _Descent:
         # dropout draws from the global generator, and no two processes may draw the same
         torch.manual_seed(recipe.seed + 7919 * run.team.rank)
         fit.network.train()
-        self._optimizer = torch.optim.Adam(fit.network.parameters(), lr=recipe.rate)
-        self._schedule = torch.optim.lr_scheduler.StepLR(self._optimizer, DECAY_EVERY, DECAY)
+        self._optimizer = torch.optim.AdamW(
+            fit.network.parameters(), lr=recipe.rate, weight_decay=recipe.weight_decay
+        )  # without decay of the weights it is Adam
+        self._schedule = _schedule(self._optimizer, recipe)
         self._averaged = AveragedModel(fit.network, use_buffers=True)
         self._losses: list[float] = []
 
@@ -156,7 +162,7 @@ class _Descent:
         team, device = self._run.team, self._run.device
         losses = []
         for drawn, known, labels in draw_batches(self._shares, self._recipe, self._drawn):
-            poses = augment(drawn, self._drawn) if self._recipe.augmented else drawn
+            poses = augment(drawn, self._drawn, self._recipe.noise) if self._recipe.augmented else drawn
             own = (team.own(rows).to(device) for rows in (poses, known, labels))
             loss = self._fit.loss(model, Batch(len(poses), *own))
             self._optimizer.zero_grad(set_to_none=True)
@@ -227,6 +233,13 @@ class _Descent:
         self._losses = [float(loss) for loss in saved.facts["losses"]]
 
 
+def _schedule(optimizer: torch.optim.Optimizer, recipe: Recipe) -> torch.optim.lr_scheduler.LRScheduler:
+    if recipe.schedule == "cosine":
+        lowest = LOWEST * recipe.rate
+        return torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, max(1, recipe.epochs), eta_min=lowest)
+    return torch.optim.lr_scheduler.StepLR(optimizer, DECAY_EVERY, DECAY)
+
+
 def fingerprint(fit: Fit, shares: SharesOfBatch, recipe: Recipe, run: Run) -> str:
     """Digest of all that the result of a fit depends on but the code: weights, data, settings, torch, processes."""
     digest = hashlib.sha256(repr((asdict(recipe), run.team.size, run.device.type, torch.__version__)).encode())
@@ -235,7 +248,7 @@ def fingerprint(fit: Fit, shares: SharesOfBatch, recipe: Recipe, run: Run) -> st
             digest.update(name.encode())
             digest.update(value.detach().cpu().contiguous().numpy().tobytes())
     for samples, share in shares:
-        digest.update(repr((share, samples.poses.shape)).encode())
-        for array in (samples.poses, samples.known, samples.labels):
+        digest.update(repr((share, samples.frames.shape)).encode())
+        for array in (samples.frames, samples.known, samples.labels):
             digest.update(np.ascontiguousarray(array).data)
     return digest.hexdigest()

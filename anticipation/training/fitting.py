@@ -16,6 +16,7 @@ from torch import Tensor, nn
 
 from anticipation.gait_state import DirectedGraphNetwork
 from anticipation.motion import HORIZON, WINDOW, Forecast
+from anticipation.outlook import Outlook
 from anticipation.training.clips import UNLABELLED
 from anticipation.training.descent import Batch, Fit, Progress, Recipe, SharesOfBatch, descend
 from anticipation.training.measures import STEPS
@@ -23,7 +24,7 @@ from anticipation.training.run import ALONE, Run
 from anticipation.training.shifted import ShiftedNetwork
 from anticipation.training.team import Team
 
-__all__ = ["Progress", "Recipe", "apply", "fit_classifier", "fit_forecaster", "fit_shifted"]
+__all__ = ["Progress", "Recipe", "apply", "fit_classifier", "fit_forecaster", "fit_outlook", "fit_shifted"]
 
 SMOOTH_L1_AT: Final = 0.05  # where the loss turns from square to absolute [body lengths]
 
@@ -79,6 +80,17 @@ def fit_classifier(
     network.set_graph_trainable(False)
     others = [forecast] if isinstance(forecast, nn.Module) else []
     descend(Fit(network, loss, [steps], network.set_graph_trainable, others), shares, recipe, progress, run)
+
+
+def fit_outlook(
+    network: Outlook, shares: SharesOfBatch, recipe: Recipe, progress: Progress = silent, run: Run = ALONE
+) -> None:
+    """Fit the second opinion: the window seen, the labels of the present and of all steps ahead."""
+
+    def loss(model: nn.Module, batch: Batch) -> Tensor:
+        return cross_entropy(model(batch.poses[:, :WINDOW]), batch.labels, run.team)
+
+    descend(Fit(network, loss), shares, recipe, progress, run)
 
 
 def fit_shifted(

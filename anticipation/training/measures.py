@@ -1,75 +1,16 @@
-"""Numbers for a table: accuracy and macro-F1 of a horizon, forecast error, calibration."""
+"""Calibration: how likely labels are under probabilities, and the temperatures that make them likeliest."""
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from anticipation.motion import HORIZON, WINDOW
-from anticipation.training.clips import FALL, TRANSIENT
-from anticipation.training.samples import Samples
 from bridge.messages import Floats
 
-STEPS: Final = (0, 3, 6, 9, 12, 15)  # 0, 100, ..., 500 ms
-ERROR_STEPS: Final = (3, 9, 15)  # 100, 300, 500 ms
+STEPS: Final = (0, 3, 6, 9, 12, 15)  # 0, 100, ..., 500 ms: the columns of the paper's table
 TEMPERATURES: Final = np.geomspace(0.4, 4.0, 47)
-
-
-class Score(NamedTuple):
-    """How often the class was right at each of `STEPS`, in 0..1."""
-
-    accuracy: Floats  # (6,)
-    macro_f1: Floats  # (6,)
-
-
-class ForecastError(NamedTuple):
-    """Mean distance between foreseen and true keypoints at each of `ERROR_STEPS`."""
-
-    all_body: Floats  # (3,) [body lengths]
-    all_px: Floats  # (3,) [px]
-    falling_body: Floats  # (3,) while falling [body lengths]
-    falling_px: Floats  # (3,) [px]
-
-
-def score(predicted: NDArray[np.int64], samples: Samples) -> Score:
-    """Score predictions (M, 16), made at frame t, against the labels of frames t + h that exist."""
-    accuracy, macro_f1 = [], []
-    for step in STEPS:
-        there = samples.labels[:, step] >= 0
-        truth, said = samples.labels[there, step], predicted[there, step]
-        accuracy.append(float((truth == said).mean()) if len(truth) else np.nan)
-        macro_f1.append(_macro_f1(truth, said))
-    return Score(np.array(accuracy), np.array(macro_f1))
-
-
-def _macro_f1(truth: NDArray[np.int64], said: NDArray[np.int64]) -> float:
-    """Mean over the classes that occur of 2 TP / (2 TP + FP + FN)."""
-    values = []
-    for kind in range(FALL + 1):
-        hit = int(((truth == kind) & (said == kind)).sum())
-        wrong = int(((truth == kind) != (said == kind)).sum())
-        if hit + wrong:
-            values.append(2 * hit / (2 * hit + wrong))
-    return float(np.mean(values)) if values else float("nan")
-
-
-def forecast_error(futures: NDArray[np.float32], samples: Samples) -> ForecastError:
-    """Mean error of futures (M, 15, 12, 2), over known frames; relative coordinates, so the body's path is left out."""
-    error = np.linalg.norm(futures - samples.poses[:, WINDOW:], axis=-1).mean(axis=-1)  # (M, 15) [body lengths]
-    known = samples.known[:, WINDOW:]
-    falling = known & (samples.labels[:, 1 : HORIZON + 1] == TRANSIENT)
-    rows = [
-        [_mean(scaled[:, step - 1], mask[:, step - 1]) for step in ERROR_STEPS]
-        for mask in (known, falling)
-        for scaled in (error, error * samples.body_px[:, None])
-    ]
-    return ForecastError(*(np.array(row) for row in rows))
-
-
-def _mean(values: NDArray[np.floating], mask: NDArray[np.bool_]) -> float:
-    return float(values[mask].mean()) if mask.any() else float("nan")
 
 
 def log_likelihood(logits: NDArray[np.floating], labels: NDArray[np.int64], temperature: float) -> float:

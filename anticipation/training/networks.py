@@ -12,6 +12,7 @@ from torch import nn
 
 from anticipation.gait_state import DirectedGraphNetwork
 from anticipation.motion import FORECASTERS, Forecast
+from anticipation.outlook import Outlook
 from anticipation.training import fitting
 from anticipation.training.corpus import Shares
 from anticipation.training.plan import Plan
@@ -45,10 +46,10 @@ def _reporter(progress: Progress, what: str, epochs: int) -> fitting.Progress:
 def pretrained_forecaster(plan: Plan, shares: Shares, progress: Progress, run: Run = ALONE) -> nn.Module:
     """Build the plan's forecaster and fit it to people who walk."""
     torch.manual_seed(plan.pretrain.seed)
-    network: nn.Module = FORECASTERS[plan.forecaster]()
-    what = f"{plan.forecaster}: walking"
-    report = _reporter(progress, what, plan.pretrain.epochs)
-    fitting.fit_forecaster(network, [(shares.walks, 1.0)], plan.pretrain, report, run.named(what))
+    network: nn.Module = FORECASTERS[plan.forecaster](**plan.settings)
+    name = f"walking: {plan.forecaster}"
+    report = _reporter(progress, name, plan.pretrain.epochs)
+    fitting.fit_forecaster(network, [(shares.walks, 1.0)], plan.pretrain, report, run.named(name))
     return network
 
 
@@ -57,29 +58,43 @@ def tuned_forecaster(
 ) -> nn.Module:
     """Fit a copy of a pre-trained forecaster to people who fall."""
     network = copy.deepcopy(pretrained)
-    what = f"{name}: {plan.forecaster}"
-    report = _reporter(progress, what, plan.finetune.epochs)
-    fitting.fit_forecaster(network, shares.motion, plan.finetune, report, run.named(what))
+    name = f"{name}: {plan.forecaster}"
+    report = _reporter(progress, name, plan.finetune.epochs)
+    fitting.fit_forecaster(network, shares.motion, plan.finetune, report, run.named(name))
     return network.requires_grad_(False)
 
 
 def fitted_classifier(
-    plan: Plan, shares: Shares, forecast: Forecast | None, name: str, progress: Progress, run: Run = ALONE
+    plan: Plan, shares: Shares, forecast: Forecast, name: str, progress: Progress, run: Run = ALONE
 ) -> DirectedGraphNetwork:
-    """Fit a classifier, on forecast windows too if a forecast is given."""
-    recipe = plan.baseline if forecast is None else plan.classifier
+    """Fit the classifier, on forecast windows if the plan says so."""
+    recipe = plan.classifier
     torch.manual_seed(recipe.seed)
-    network = DirectedGraphNetwork()
-    what = f"{name}: dgnn{'' if forecast is None else ' on forecasts'}"
-    report = _reporter(progress, what, recipe.epochs)
-    fitting.fit_classifier(network, shares.gait, recipe, forecast, report, run.named(what))
+    network = DirectedGraphNetwork(centre=plan.centre)
+    name = f"{name}: dgnn{' on forecasts' if plan.on_forecasts else ''}"
+    report = _reporter(progress, name, recipe.epochs)
+    foreseen = forecast if plan.on_forecasts else None
+    fitting.fit_classifier(network, shares.gait, recipe, foreseen, report, run.named(name))
     return network.requires_grad_(False)
 
 
-def fitted_shifted(plan: Plan, shares: Shares, name: str, progress: Progress) -> ShiftedNetwork:
+def fitted_outlook(plan: Plan, shares: Shares, name: str, progress: Progress, run: Run = ALONE) -> Outlook | None:
+    """Fit the second opinion, if the plan has one."""
+    if plan.outlook is None:
+        return None
+    torch.manual_seed(plan.outlook.seed)
+    network = Outlook()
+    name = f"{name}: outlook"
+    report = _reporter(progress, name, plan.outlook.epochs)
+    fitting.fit_outlook(network, shares.gait, plan.outlook, report, run.named(name))
+    return network.requires_grad_(False)
+
+
+def fitted_shifted(plan: Plan, shares: Shares, name: str, progress: Progress, run: Run = ALONE) -> ShiftedNetwork:
     """Fit the paper's baseline, DGNN-only."""
     torch.manual_seed(plan.baseline.seed)
     network = ShiftedNetwork()
-    report = _reporter(progress, f"{name}: dgnn, shifted labels", plan.baseline.epochs)
-    fitting.fit_shifted(network, shares.gait, plan.baseline, report)
+    name = f"{name}: dgnn, shifted labels"
+    report = _reporter(progress, name, plan.baseline.epochs)
+    fitting.fit_shifted(network, shares.gait, plan.baseline, report, run.named(name))
     return network.requires_grad_(False)

@@ -9,19 +9,17 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 from rich.progress import Progress
 from torch import nn
 
 from anticipation.checkpoint import Checkpoint, Provenance
-from anticipation.mirror import mirrored
 from anticipation.motion import COORDINATES, WINDOW
 from anticipation.quality import PoseStatistics
 from anticipation.training.corpus import Corpus, Shares, people_folds, shares, tested
 from anticipation.training.fitting import apply
 from anticipation.training.measures import temperatures
-from anticipation.training.networks import fitted_classifier, pretrained_forecaster, tuned_forecaster
+from anticipation.training.networks import fitted_classifier, fitted_outlook, pretrained_forecaster, tuned_forecaster
 from anticipation.training.plan import Plan
 from anticipation.training.run import ALONE, Run
 from anticipation.training.samples import Samples, Track, cut
@@ -103,6 +101,8 @@ def fold_checkpoint(
         plane=_plane(corpus, chosen, seed),
         statistics=_statistics(known, seed),
         temperature=np.ones(STEPS),
+        mirrored=plan.mirrored,
+        outlook=fitted_outlook(plan, known, name, progress, run),
         provenance=Provenance(DATA, LICENCE, f"{name}: for evaluation only"),
     )
 
@@ -127,15 +127,8 @@ def _all(corpus: Corpus) -> tuple[Track, ...]:
 
 
 def _logits(checkpoint: Checkpoint, samples: Samples) -> NDArray[np.float32]:
-    """Return logits (M, 16, 3) of the present and the 15 foreseen steps, averaged with the mirror image's."""
-
-    def run(window: torch.Tensor) -> torch.Tensor:
-        sides = (window, mirrored(window))
-        one, other = (checkpoint.classifier(torch.cat((side, checkpoint.forecast(side)), dim=1)) for side in sides)
-        logits: torch.Tensor = 0.5 * (one + other)
-        return logits
-
-    return apply(run, samples.poses[:, :WINDOW])
+    """Return logits (M, 16, 3) of the present and the 15 foreseen steps."""
+    return apply(checkpoint.logits, samples.frames[:, :WINDOW])
 
 
 def _plane(corpus: Corpus, chosen: Sequence[Track], seed: int) -> TransientPlane:

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from anticipation.motion import HORIZON, WINDOW
+from anticipation.centre import centre_velocity
+from anticipation.motion import HORIZON, ROWS, WINDOW
 from anticipation.training.clips import UNLABELLED, Clip, Labels
 from bridge.config.perception import CleaningConfig
-from bridge.messages import Floats, KeypointStatus
+from bridge.messages import KEYPOINTS, Floats, KeypointStatus
 from perception.cleaning import clean_clip
-from perception.features import relative
+from perception.features import relative, upper_body_centre
 
 Flags = NDArray[np.bool_]
 SPAN = WINDOW + HORIZON  # frames of a sample
@@ -29,28 +30,40 @@ class Track:
     name: str
     group: str
     source: str
-    poses: Floats  # (T, 12, 2) relative to the upper-body centre, in body lengths; NaN where lost
+    frames: Floats  # (T, 13, 2) as `anticipation.motion` says; keypoints NaN where one is lost
     whole: Flags  # (T,) every keypoint measured or filled
     body_px: Floats  # (T,) body length [px]
     labels: Labels  # (T,)
 
+    @property
+    def poses(self) -> Floats:
+        """Keypoints relative to the upper-body centre in body lengths, (T, 12, 2)."""
+        return self.frames[:, :KEYPOINTS]
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """Windows with what followed them. Where the future is unknown its poses repeat the last known one."""
+    """Windows with what followed them. Where the future is unknown its frames repeat the last known one."""
 
-    poses: NDArray[np.float32]  # (M, 30, 12, 2): WINDOW frames seen, HORIZON frames to come
+    frames: NDArray[np.float32]  # (M, 30, 13, 2): WINDOW frames seen, HORIZON frames to come
     known: Flags  # (M, 30) the frame exists and is whole
     labels: Labels  # (M, 16) of the present and the next 15 frames
     body_px: NDArray[np.float32]  # (M,) body length at the present [px]
     track: NDArray[np.int64]  # (M,) index of the track
 
     def __len__(self) -> int:
-        return len(self.poses)
+        return len(self.frames)
+
+    @property
+    def poses(self) -> NDArray[np.float32]:
+        """Keypoints without the centre's velocity, (M, 30, 12, 2)."""
+        return self.frames[:, :, :KEYPOINTS]
 
     def take(self, index: NDArray[np.int64]) -> Samples:
         """Return the samples at `index`."""
-        return Samples(self.poses[index], self.known[index], self.labels[index], self.body_px[index], self.track[index])
+        return Samples(
+            self.frames[index], self.known[index], self.labels[index], self.body_px[index], self.track[index]
+        )
 
 
 def clean(clip: Clip, config: CleaningConfig) -> Track:
@@ -61,12 +74,15 @@ def clean(clip: Clip, config: CleaningConfig) -> Track:
     body = np.array([frame.body_length_px for frame in frames], dtype=np.float64)
     lost = np.array([frame.status for frame in frames]).reshape(-1, 12) == KeypointStatus.LOST
     whole = ~lost.any(axis=1) & np.isfinite(positions).all(axis=(1, 2)) & (body > 0)
-    poses = np.full(positions.shape, np.nan)
-    poses[whole] = relative(positions[whole], body[whole])
+    centres = upper_body_centre(positions)
+    before = np.concatenate([np.full((1, 2), np.nan), centres[:-1]])[: len(frames)]
+    rows = np.full((len(frames), ROWS, 2), np.nan)
+    rows[whole, :KEYPOINTS] = relative(positions[whole], body[whole])
+    rows[:, KEYPOINTS] = centre_velocity(centres, before, body)
     labels = np.full(len(frames), UNLABELLED, dtype=np.int64)
     if clip.labels is not None and frames:
         labels = clip.labels[nearest(stamps, np.array([frame.stamp_ns for frame in frames]))]
-    return Track(clip.name, clip.group, clip.source, poses, whole, body, labels)
+    return Track(clip.name, clip.group, clip.source, rows, whole, body, labels)
 
 
 def nearest(stamps: NDArray[np.int64], wanted: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -78,9 +94,9 @@ def nearest(stamps: NDArray[np.int64], wanted: NDArray[np.int64]) -> NDArray[np.
 
 def cut(tracks: Sequence[Track], stride: int = 1) -> Samples:
     """Cut every whole window of the tracks, one each `stride` frames."""
-    poses, known, labels, body, owner = [], [], [], [], []
+    rows, known, labels, body, owner = [], [], [], [], []
     for index, track in enumerate(tracks):
-        frames = len(track.poses)
+        frames = len(track.frames)
         for present in range(WINDOW - 1, frames, stride):
             first = present - WINDOW + 1
             if not track.whole[first : present + 1].all():
@@ -89,13 +105,13 @@ def cut(tracks: Sequence[Track], stride: int = 1) -> Samples:
             exists = (stretch < frames) & track.whole[np.minimum(stretch, frames - 1)]
             last = np.maximum.accumulate(np.where(exists, np.arange(SPAN), 0))
             ahead = stretch[WINDOW - 1 :]
-            poses.append(track.poses[first + last].astype(np.float32))
+            rows.append(track.frames[first + last].astype(np.float32))
             known.append(exists)
             labels.append(np.where(ahead < frames, track.labels[np.minimum(ahead, frames - 1)], UNLABELLED))
             body.append(track.body_px[present])
             owner.append(index)
     return Samples(
-        np.array(poses, dtype=np.float32).reshape(-1, SPAN, 12, 2),
+        np.array(rows, dtype=np.float32).reshape(-1, SPAN, ROWS, 2),
         np.array(known, dtype=bool).reshape(-1, SPAN),
         np.array(labels, dtype=np.int64).reshape(-1, HORIZON + 1),
         np.array(body, dtype=np.float32),
@@ -107,7 +123,7 @@ def join(parts: Sequence[Samples]) -> Samples:
     """Put samples of several origins together; track indices keep counting."""
     offsets = np.cumsum([0] + [int(part.track.max(initial=-1)) + 1 for part in parts[:-1]])
     return Samples(
-        np.concatenate([part.poses for part in parts]),
+        np.concatenate([part.frames for part in parts]),
         np.concatenate([part.known for part in parts]),
         np.concatenate([part.labels for part in parts]),
         np.concatenate([part.body_px for part in parts]),

@@ -15,7 +15,8 @@ from anticipation.training.measures import STEPS
 
 
 class ShiftedNetwork(nn.Module):
-    """Logits of the states now and 100, ..., 500 ms ahead: (B, T >= 15, 12, 2) -> (B, 6, 3), from the newest window."""
+    """Logits of the states now and 100, ..., 500 ms ahead: (B, T >= 15, 13, 2) -> (B, 6, 3), from the newest
+    window, of which it looks at the keypoints alone."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -27,6 +28,6 @@ class ShiftedNetwork(nn.Module):
         self.trunk.set_graph_trainable(trainable)
 
     def forward(self, frames: Tensor) -> Tensor:
-        """Logits (B, 6, 3) of the last 15 of frames (B, T, 12, 2)."""
+        """Logits (B, 6, 3) of the last 15 of frames (B, T, 13, 2)."""
         pooled = self.trunk.dropout(self.trunk.embedding(frames[:, -WINDOW:])[:, -1])  # (B, 128)
         return torch.stack([head(pooled) for head in self.heads], dim=1)

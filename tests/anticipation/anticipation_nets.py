@@ -7,7 +7,8 @@ import torch
 
 from anticipation.checkpoint import Checkpoint, Provenance
 from anticipation.gait_state import DirectedGraphNetwork
-from anticipation.motion import DctMlpForecaster
+from anticipation.motion import MlpForecaster
+from anticipation.outlook import Outlook
 from anticipation.quality import PoseStatistics
 from anticipation.transient import TransientPlane
 from bridge.messages import Keypoints, KeypointStatus
@@ -49,12 +50,14 @@ def pose_statistics() -> PoseStatistics:
 def random_checkpoint(seed: int = 0, features: str = "window") -> Checkpoint:
     """A checkpoint of the shipped kind whose networks were never trained."""
     torch.manual_seed(seed)
-    classifier = DirectedGraphNetwork()
-    forecaster = DctMlpForecaster(32, 2)
+    classifier = DirectedGraphNetwork(centre=True)
+    outlook = Outlook(16)
+    forecaster = MlpForecaster(32, 2)
     torch.nn.init.normal_(forecaster.leave.weight, std=0.01)
     return Checkpoint(
         forecaster=forecaster.eval(),
         classifier=classifier.eval(),
+        outlook=outlook.eval(),
         plane=random_plane(features),
         statistics=pose_statistics(),
         temperature=np.linspace(1.0, 1.5, 16),

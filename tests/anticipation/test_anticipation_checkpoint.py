@@ -13,7 +13,7 @@ from safetensors.torch import save_file
 
 from anticipation.checkpoint import Checkpoint, load, save
 from anticipation.gait_state import DirectedGraphNetwork
-from anticipation.motion import DctMlpForecaster, LstmForecaster
+from anticipation.motion import DctMlpForecaster, LstmForecaster, MlpForecaster
 from bridge.errors import CheckpointError
 
 
@@ -51,17 +51,24 @@ def refusal(path: Path) -> str:
 
 @pytest.mark.parametrize(
     "forecaster",
-    [DctMlpForecaster(32, 2), LstmForecaster("rollout", 32), LstmForecaster("direct", 32), "zero_velocity"],
+    [
+        MlpForecaster(32, 2),
+        DctMlpForecaster(32, 2),
+        LstmForecaster("rollout", 32),
+        LstmForecaster("direct", 32),
+        "zero_velocity",
+    ],
 )
 def test_everything_comes_back(forecaster, tmp_path):
     saved = replace(random_checkpoint(), forecaster=forecaster)
     save(saved, tmp_path / "deeper" / "b.safetensors", storage="float32")
     loaded = load(tmp_path / "deeper" / "b.safetensors")
-    frames = torch.randn(1, 30, 12, 2)
+    frames = torch.randn(1, 30, 13, 2)
     for network in (saved.forecaster, saved.classifier):
         if isinstance(network, torch.nn.Module):
             network.eval()
     assert torch.equal(loaded.classifier(frames), saved.classifier(frames))
+    assert torch.equal(loaded.logits(frames[:, :15]), saved.logits(frames[:, :15]))
     assert torch.equal(loaded.forecast(frames[:, :15]), saved.forecast(frames[:, :15]))
     for name, array in saved.plane.arrays().items():
         assert np.array_equal(loaded.plane.arrays()[name], array)
@@ -75,7 +82,7 @@ def test_everything_comes_back(forecaster, tmp_path):
 def test_half_precision_halves_the_file_and_hardly_moves_the_answer(checkpoint, path, tmp_path):
     save(checkpoint, tmp_path / "wide.safetensors", storage="float32")
     assert path.stat().st_size < 0.6 * (tmp_path / "wide.safetensors").stat().st_size
-    frames = torch.randn(4, 15, 12, 2)
+    frames = torch.randn(4, 15, 13, 2)
     checkpoint.classifier.eval()
     torch.testing.assert_close(load(path).classifier(frames), checkpoint.classifier(frames), atol=5e-3, rtol=0)
 
@@ -107,7 +114,23 @@ def test_safetensors_of_someone_else(path):
 
 
 def test_another_version(path):
-    assert "format is 99, this version reads 1" in refusal(with_header(path, format=99))
+    assert "format is 99, this version reads 2" in refusal(with_header(path, format=99))
+
+
+def test_weights_from_before_the_centre_s_velocity_say_how_to_get_new_ones(path):
+    assert "make it again with `surefoot train`" in refusal(with_header(path, format=1))
+
+
+def test_without_outlook_and_mirror(checkpoint, tmp_path):
+    """The paper's configuration has neither."""
+    bare = replace(checkpoint, outlook=None, mirrored=False)
+    save(bare, tmp_path / "bare.safetensors", storage="float32")
+    loaded = load(tmp_path / "bare.safetensors")
+    assert loaded.outlook is None
+    assert not loaded.mirrored
+    window = torch.randn(2, 15, 13, 2)
+    frames = torch.cat((window, loaded.forecast(window)), dim=1)
+    assert torch.equal(loaded.logits(window), loaded.classifier(frames))
 
 
 @pytest.mark.parametrize("entry", ["classes", "keypoints"])
@@ -124,7 +147,7 @@ def test_unknown_network(path):
 
 
 def test_unknown_setting(path):
-    settings = {"name": "dct_mlp", "settings": {"depth": 3}}
+    settings = {"name": "mlp", "settings": {"depth": 3}}
     assert "depth" in refusal(with_header(path, forecaster=settings))
 
 

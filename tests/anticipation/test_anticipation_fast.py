@@ -7,13 +7,14 @@ from test_anticipation_gait_state import shaken
 from anticipation.fast_gait_state import FastDirectedGraph
 from anticipation.fast_motion import fast_forecast
 from anticipation.gait_state import DirectedGraphNetwork
-from anticipation.motion import DctMlpForecaster, LstmForecaster, zero_velocity
+from anticipation.motion import DctMlpForecaster, LstmForecaster, MlpForecaster, zero_velocity
+from anticipation.outlook import FastOutlook, Outlook
 
 
 @pytest.mark.parametrize("frames", [15, 30])
 @pytest.mark.parametrize(
     "settings",
-    [{}, {"in_channels": 4}, {"widths": (8, 8, 12), "kernels": (3, 5, 9)}, {"widths": (8,), "kernels": (15,)}],
+    [{}, {"centre": True}, {"widths": (8, 8, 12), "kernels": (3, 5, 9)}, {"widths": (8,), "kernels": (15,)}],
 )
 def test_the_classifier(settings, frames):
     torch.manual_seed(0)
@@ -22,7 +23,7 @@ def test_the_classifier(settings, frames):
         for name, parameter in network.named_parameters():
             if "offset" in name:
                 parameter.normal_(0, 0.3)
-    sequence = torch.randn(1, frames, 12, settings.get("in_channels", 2))
+    sequence = torch.randn(1, frames, 13, 2)
     quick = FastDirectedGraph(network)
     with torch.inference_mode():
         judgement = quick(sequence)
@@ -38,19 +39,28 @@ def test_the_recurrent_forecaster(mode, residual):
     for name, parameter in network.named_parameters():
         if "bias" in name:
             torch.nn.init.normal_(parameter)
-    window = torch.randn(1, 15, 12, 2)
+    window = torch.randn(1, 15, 13, 2)
     with torch.inference_mode():
         torch.testing.assert_close(fast_forecast(network)(window), network(window), atol=1e-5, rtol=1e-5)
 
 
-def test_the_small_forecaster():
+@pytest.mark.parametrize("kind", [DctMlpForecaster, MlpForecaster])
+def test_the_small_forecasters(kind):
     torch.manual_seed(0)
-    network = DctMlpForecaster(16, 3).eval()
+    network = kind(16, 3).eval()
     for parameter in network.parameters():
         torch.nn.init.normal_(parameter, std=0.5)
-    window = torch.randn(1, 15, 12, 2)
+    window = torch.randn(1, 15, 13, 2)
     with torch.inference_mode():
         torch.testing.assert_close(fast_forecast(network)(window), network(window), atol=1e-5, rtol=1e-5)
+
+
+def test_the_outlook():
+    torch.manual_seed(0)
+    network = shaken(Outlook(16))
+    windows = torch.randn(2, 15, 13, 2)
+    with torch.inference_mode():
+        torch.testing.assert_close(FastOutlook(network)(windows), network(windows), atol=1e-5, rtol=1e-5)
 
 
 def test_what_is_quick_already_stays_as_it_is():
@@ -59,7 +69,7 @@ def test_what_is_quick_already_stays_as_it_is():
 
 def test_later_training_does_not_reach_the_quick_copy():
     network = shaken(DirectedGraphNetwork())
-    quick, frames = FastDirectedGraph(network), torch.randn(1, 15, 12, 2)
+    quick, frames = FastDirectedGraph(network), torch.randn(1, 15, 13, 2)
     with torch.inference_mode():
         before = quick(frames).logits
     with torch.no_grad():

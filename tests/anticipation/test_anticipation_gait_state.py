@@ -47,9 +47,16 @@ def test_kernels_that_do_not_see_fifteen_frames_are_refused():
         DirectedGraphNetwork(kernels=(5, 5, 5))
 
 
-def test_more_streams_fit_in():
-    network = DirectedGraphNetwork(in_channels=4).eval()
-    assert network(torch.randn(2, 20, 12, 4)).shape == (2, 6, 3)
+def test_only_with_the_centre_is_its_velocity_looked_at(network):
+    """The paper's network reads the keypoints of a frame, whether or not something follows them."""
+    frames = torch.randn(2, 20, 13, 2)
+    faster = frames.clone()
+    faster[:, 10, 12] += 1.0
+    assert torch.equal(network(frames), network(faster))
+    assert torch.equal(network(frames), network(frames[:, :, :12]))
+    seeing = shaken(DirectedGraphNetwork(centre=True))
+    changed = (seeing(frames) != seeing(faster)).any(dim=2)
+    assert changed.all()  # frame 10 is in each of the six windows
 
 
 def test_embedding_is_what_the_last_layer_sees(network):

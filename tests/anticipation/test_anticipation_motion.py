@@ -13,25 +13,27 @@ from anticipation.motion import (
     WINDOW,
     DctMlpForecaster,
     LstmForecaster,
+    MlpForecaster,
     constant_velocity,
     cosine_basis,
     zero_velocity,
 )
 
-SMALL = {"lstm": {"hidden": 16}, "dct_mlp": {"width": 16, "blocks": 2}}
+SMALL = {"lstm": {"hidden": 16}, "dct_mlp": {"width": 16, "blocks": 2}, "mlp": {"width": 16, "blocks": 2}}
 EVERY = [
     LstmForecaster("direct", 16),
     LstmForecaster("rollout", 16),
     LstmForecaster("rollout", 16, residual=False),
     DctMlpForecaster(16, 2),
+    MlpForecaster(16, 2),
 ]
 
 
 @pytest.mark.parametrize("forecast", [*EVERY, *BASELINES.values()])
 @pytest.mark.parametrize("batch", [1, 5])
 def test_half_a_second_in_half_a_second_out(forecast, batch):
-    future = forecast(torch.randn(batch, WINDOW, 12, 2))
-    assert future.shape == (batch, HORIZON, 12, 2)
+    future = forecast(torch.randn(batch, WINDOW, 13, 2))
+    assert future.shape == (batch, HORIZON, 13, 2)
     assert torch.isfinite(future).all()
 
 
@@ -40,13 +42,13 @@ def test_settings_rebuild_the_same_network(name):
     network = FORECASTERS[name](**SMALL[name])
     again = FORECASTERS[name](**network.settings)
     again.load_state_dict(network.state_dict())
-    window = torch.randn(2, WINDOW, 12, 2)
+    window = torch.randn(2, WINDOW, 13, 2)
     assert torch.equal(network.eval()(window), again.eval()(window))
 
 
 @pytest.mark.parametrize("forecaster", EVERY)
 def test_windows_do_not_influence_each_other(forecaster):
-    windows = torch.randn(3, WINDOW, 12, 2)
+    windows = torch.randn(3, WINDOW, 13, 2)
     forecaster.eval()
     torch.testing.assert_close(forecaster(windows)[1:2], forecaster(windows[1:2]), atol=1e-6, rtol=0)
     forecaster.train()
@@ -55,10 +57,12 @@ def test_windows_do_not_influence_each_other(forecaster):
 @pytest.mark.parametrize("forecaster", EVERY)
 def test_every_parameter_learns(forecaster):
     torch.manual_seed(0)
-    if isinstance(forecaster, DctMlpForecaster):  # its last layer starts at zero and would hide the others
+    if isinstance(
+        forecaster, DctMlpForecaster | MlpForecaster
+    ):  # its last layer starts at zero and would hide the others
         torch.nn.init.normal_(forecaster.leave.weight)
     forecaster.zero_grad()
-    forecaster(torch.randn(8, WINDOW, 12, 2)).pow(2).sum().backward()
+    forecaster(torch.randn(8, WINDOW, 13, 2)).pow(2).sum().backward()
     silent = [name for name, p in forecaster.named_parameters() if p.grad is None or not p.grad.abs().sum() > 0]
     assert silent == []
 
@@ -83,8 +87,20 @@ def test_rollout_feeds_its_output_back():
 
 
 def test_an_untrained_small_network_holds_the_last_pose():
-    window = torch.randn(3, WINDOW, 12, 2)
+    window = torch.randn(3, WINDOW, 13, 2)
     torch.testing.assert_close(DctMlpForecaster().eval()(window), zero_velocity(window).clone())
+    torch.testing.assert_close(MlpForecaster().eval()(window)[:, :, :12], zero_velocity(window)[:, :, :12].clone())
+
+
+@pytest.mark.parametrize("forecast", [*EVERY[:4], *BASELINES.values()])
+def test_what_knows_of_coordinates_alone_lets_the_centre_go_on(forecast):
+    """At the velocity between the last three frames, whatever the keypoints do; and it needs no centre."""
+    window = torch.randn(2, WINDOW, 13, 2)
+    if isinstance(forecast, torch.nn.Module):
+        forecast.eval()
+    future = forecast(window)
+    torch.testing.assert_close(future[:, :, 12], window[:, -2:, 12].mean(dim=1, keepdim=True).expand(-1, HORIZON, -1))
+    assert torch.equal(forecast(window[:, :, :12]), future[:, :, :12])
 
 
 @given(st.integers(0, 2**31 - 1))

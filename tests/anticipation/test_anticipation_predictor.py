@@ -30,6 +30,12 @@ def walking(tick: int) -> np.ndarray:
     return pose
 
 
+def still_window(ticks) -> torch.Tensor:
+    """What the networks read of someone who walks on the spot: (1, 15, 13, 2)."""
+    poses = torch.tensor(np.array([walking(tick) for tick in ticks]), dtype=torch.float32)
+    return torch.cat((poses, torch.zeros(len(poses), 1, 2)), dim=1)[None]
+
+
 def predictor(config: AnticipationConfig = CONFIG, **changes) -> Predictor:
     return Predictor(replace(random_checkpoint(), **changes), config)
 
@@ -61,17 +67,20 @@ def test_the_sixteen_steps_are_sixteen_windows_judged_one_by_one(features, forec
     if forecaster is not None:
         checkpoint = replace(checkpoint, forecaster=forecaster)
     horizon = run(Predictor(checkpoint, CONFIG))
-    seen = torch.tensor(np.array([walking(tick) for tick in range(5, 20)]), dtype=torch.float32)[None]
+    seen = still_window(range(5, 20))
     with torch.inference_mode():
         frames = torch.cat((seen, checkpoint.forecast(seen)), dim=1)
         windows = torch.cat([frames[:, step : step + 15] for step in range(16)])
         reflected = torch.cat((mirrored(seen), checkpoint.forecast(mirrored(seen))), dim=1)
         reflections = torch.cat([reflected[:, step : step + 15] for step in range(16)])
         mean = 0.5 * (checkpoint.classifier(windows) + checkpoint.classifier(reflections))
-        logits = mean[:, 0].double().numpy() / checkpoint.temperature[:, None]
+        outlook = 0.5 * (checkpoint.outlook(seen) + checkpoint.outlook(mirrored(seen)))[0]
+        logits = 0.5 * (mean[:, 0] + outlook)
+        torch.testing.assert_close(checkpoint.logits(seen)[0], logits, atol=1e-5, rtol=0)
+        logits = logits.double().numpy() / checkpoint.temperature[:, None]
         inputs = {
-            "window": windows.flatten(1),
-            "folded": torch.stack((windows[..., 0].abs(), windows[..., 1]), dim=-1).flatten(1),
+            "window": windows[:, :, :12].flatten(1),
+            "folded": torch.stack((windows[..., 0].abs(), windows[..., 1]), dim=-1)[:, :, :12].flatten(1),
             "embedding": checkpoint.classifier.embedding(windows)[:, 0],
         }[features]
     expected = np.exp(logits) / np.exp(logits).sum(axis=1, keepdims=True)
@@ -94,7 +103,7 @@ def test_a_mirrored_person_is_judged_alike():
             subject.push(message(tick, pose.double().numpy()))
         horizons.append(subject.predict())
         with torch.inference_mode():
-            seen = torch.stack(poses)[None]
+            seen = torch.cat((torch.stack(poses), torch.zeros(15, 1, 2)), dim=1)[None]
             one_sided.append(shipped.classifier(torch.cat((seen, shipped.forecast(seen)), dim=1)).softmax(dim=-1))
     np.testing.assert_allclose(horizons[0].probabilities, horizons[1].probabilities, atol=1e-4)
     assert (one_sided[0] - one_sided[1]).abs().max() > 0.01, (
@@ -123,7 +132,7 @@ def test_the_shipped_plane_sees_left_and_right_alike():
 @pytest.mark.parametrize("name", ["zero_velocity", "constant_velocity"])
 def test_the_config_can_name_a_forecast_that_needs_no_learning(name):
     named = run(predictor(AnticipationConfig(forecaster=name, min_quality=0.0)))
-    seen = torch.tensor(np.array([walking(tick) for tick in range(5, 20)]), dtype=torch.float32)[None]
+    seen = still_window(range(5, 20))[:, :, :12]
     future = {"zero_velocity": zero_velocity, "constant_velocity": constant_velocity}[name](seen)[0].numpy()
     np.testing.assert_allclose(named.forecast_px[1:], future * 100 + (160, 120), atol=1e-3)
 

@@ -153,7 +153,7 @@ def test_samples_hold_what_was_seen_what_came_and_its_labels():
     track = clean(standing(80, 30.0, labels), CleaningConfig())
     samples = cut([track])
     frames = len(track.poses)
-    assert samples.poses.shape[1:] == (WINDOW + HORIZON, 12, 2)
+    assert samples.frames.shape[1:] == (WINDOW + HORIZON, 13, 2)
     first = np.flatnonzero(track.whole)[0]
     assert np.allclose(samples.poses[0], track.poses[first : first + WINDOW + HORIZON], atol=1e-6)
     assert (samples.labels[0] == track.labels[first + WINDOW - 1 : first + WINDOW + HORIZON]).all()

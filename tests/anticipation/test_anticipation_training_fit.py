@@ -17,7 +17,7 @@ from anticipation.training.augmentation import augment
 from anticipation.training.clips import Clip
 from anticipation.training.commands import train
 from anticipation.training.evaluation.command import evaluate
-from anticipation.training.measures import calibration_error, score, temperatures
+from anticipation.training.measures import calibration_error, temperatures
 from anticipation.training.samples import clean, cut
 from bridge.config.perception import CleaningConfig
 from bridge.errors import SurefootError
@@ -66,22 +66,13 @@ def test_training_repeats_for_a_seed_and_lowers_the_loss(kind, samples):
 
 
 def test_augmentation_keeps_shape_and_changes_whole_samples_alike():
-    poses = torch.randn(1, 1, 12, 2).expand(64, WINDOW + HORIZON, 12, 2).contiguous()
+    poses = torch.randn(1, 1, 13, 2).expand(64, WINDOW + HORIZON, 13, 2).contiguous()
     changed = augment(poses, torch.Generator().manual_seed(0))
     assert changed.shape == poses.shape
     assert torch.isfinite(changed).all()
     within = changed.std(dim=1).median()
     between = changed.mean(dim=1).std(dim=0).median()
     assert within < 0.1 < between
-
-
-def test_scores_of_a_perfect_and_of_a_blind_prediction(samples):
-    perfect = np.maximum(samples.labels, 0)
-    assert np.allclose(score(perfect, samples).accuracy, 1)
-    assert np.allclose(score(perfect, samples).macro_f1, 1)
-    blind = score(np.zeros_like(perfect), samples)
-    assert (blind.accuracy < 0.6).all()
-    assert (blind.macro_f1 < 0.35).all()
 
 
 def test_temperature_undoes_overconfidence():

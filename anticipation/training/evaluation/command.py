@@ -19,7 +19,7 @@ from anticipation.training.evaluation.recordings import read_recordings
 from anticipation.training.evaluation.records import Predictions
 from anticipation.training.evaluation.results import results_of
 from anticipation.training.networks import progress_bars
-from anticipation.training.plan import plan_for
+from anticipation.training.plan import RecipeName, plan_for
 from anticipation.training.report.console import show
 from anticipation.training.report.folder import (
     predictions_path,
@@ -31,13 +31,6 @@ from anticipation.training.report.folder import (
 from anticipation.training.report.page import PAGE
 from bridge.config.load import load_config
 from bridge.errors import SurefootError
-
-
-class Forecaster(StrEnum):
-    """Forecasters that can be trained."""
-
-    LSTM = "lstm"
-    DCT_MLP = "dct_mlp"
 
 
 class Protocol(StrEnum):
@@ -71,7 +64,9 @@ def evaluate(
     json_file: Annotated[Path | None, typer.Option("--json", help="Write every number to this file.")] = None,
     folds: Annotated[int, typer.Option(min=2, max=24, help="Folds, divided by recording.")] = 5,
     seed: Annotated[int, typer.Option(min=0, help="Seed of folds, draws and weights.")] = 0,
-    forecaster: Annotated[Forecaster, typer.Option(help="Network that foresees the motion.")] = Forecaster.DCT_MLP,
+    recipe: Annotated[
+        RecipeName, typer.Option(help="Networks and how they learn: the shipped ones, or others.")
+    ] = RecipeName.SUREFOOT,
     keypoints: Annotated[
         Keypoints, typer.Option(help="Tracks of the falls that the tables are made of.")
     ] = Keypoints.ALPHAPOSE,
@@ -114,7 +109,7 @@ def evaluate(
         place = stored or report or Path(scratch)
 
         def study(seed: int, keypoints: str) -> Study:
-            plan = plan_for(forecaster.value, seed, quick, epochs)
+            plan = plan_for(recipe, seed, quick, epochs)
             folder = data_folder(data)
             corpus = read_corpus(folder, plan.mocap_clips, seed, parsed.perception.cleaning)
             filmed = read_recordings(folder, corpus, plan.mocap_clips, seed)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import nn
 
+from anticipation.centre import centre_velocity
 from anticipation.checkpoint import Checkpoint
 from anticipation.motion import WINDOW
 from anticipation.predictor import Predictor
@@ -29,7 +30,7 @@ from anticipation.training.fitting import apply
 from anticipation.training.measures import STEPS as TABLE_STEPS
 from bridge.config.anticipation import AnticipationConfig
 from bridge.config.perception import CleaningConfig
-from bridge.messages import STEPS
+from bridge.messages import STEPS, Keypoints
 from perception.features import relative
 
 SHIFTED: Final = "DGNN only, shifted labels"
@@ -67,7 +68,8 @@ def _ticks(
     tested = whole_windows(there)
     heard = hear(predictor, ticks)
     rows = {name: _classes(hear(each, ticks)) for name, each in naive.items()}
-    windows = _windows(poses, tested)
+    centre_px = centres(ticks)
+    windows = _windows(poses, centre_px, ticks, tested)
     if shifted is not None:
         rows[SHIFTED] = _shifted_classes(shifted, windows, tested)
     return Ticks(
@@ -76,7 +78,7 @@ def _ticks(
         tested=tested,
         whole=there,
         poses=poses,
-        centre_px=centres(ticks),
+        centre_px=centre_px,
         body_px=np.array([tick.body_length_px for tick in ticks], dtype=np.float32),
         rows=rows,
         planes={rival.name: _spread(rival.judge(windows), tested) for rival in rivals},
@@ -84,10 +86,16 @@ def _ticks(
     )
 
 
-def _windows(poses: NDArray[np.float32], tested: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Return the whole windows (M, 15, 12, 2), one for each tick that ends one."""
+def _windows(
+    poses: NDArray[np.float32], centre_px: NDArray[np.float32], ticks: Sequence[Keypoints], tested: NDArray[np.bool_]
+) -> NDArray[np.float32]:
+    """Return the whole windows (M, 15, 13, 2), one for each tick that ends one."""
+    body_px = np.array([tick.body_length_px for tick in ticks])
+    before = np.concatenate([np.full((1, 2), np.nan), centre_px[:-1]])[: len(ticks)]
+    velocity = centre_velocity(centre_px.astype(np.float64), before, body_px).astype(np.float32)
+    frames = np.concatenate([poses, velocity[:, None]], axis=1)
     ends = np.flatnonzero(tested)
-    windows: NDArray[np.float32] = poses[ends[:, None] + np.arange(1 - WINDOW, 1)]
+    windows: NDArray[np.float32] = frames[ends[:, None] + np.arange(1 - WINDOW, 1)]
     return windows
 
 

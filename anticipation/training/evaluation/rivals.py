@@ -14,13 +14,13 @@ import torch
 from numpy.typing import NDArray
 
 from anticipation.checkpoint import Checkpoint
+from anticipation.mirror import mirrored
 from anticipation.motion import COORDINATES, WINDOW
 from anticipation.training.corpus import Corpus
 from anticipation.training.fitting import apply
 from anticipation.training.samples import Track, cut
 from anticipation.transient import TransientPlane, fold
-from bridge.messages import Floats
-from perception.skeleton import MIRROR
+from bridge.messages import KEYPOINTS, Floats
 
 Reduction = Literal["pca", "lda"]
 Windows = NDArray[np.float32]
@@ -34,12 +34,12 @@ class Rival(NamedTuple):
     """A way from a window to a point in the plane."""
 
     name: str
-    features: Callable[[Windows], Floats]  # (M, 15, 12, 2) -> (M, D)
+    features: Callable[[Windows], Floats]  # (M, 15, 13, 2) -> (M, D)
     plane: TransientPlane
     reduce: Callable[[Floats], Floats]  # (M, D) -> what the plane takes
 
     def judge(self, windows: Windows) -> NDArray[np.float32]:
-        """Return signed distance [sd] and region of windows (M, 15, 12, 2): (M, 2)."""
+        """Return signed distance [sd] and region of windows (M, 15, 13, 2): (M, 2)."""
         points = self.plane.project(self.reduce(self.features(windows)))
         return np.stack([self.plane.signed_distance(points), self.plane.regions(points)], axis=1).astype(np.float32)
 
@@ -85,14 +85,14 @@ def _training(corpus: Corpus, chosen: Sequence[Track], seed: int) -> tuple[Windo
         rows = np.flatnonzero(samples.labels[:, 0] >= 0)
         if most is not None and most < len(rows):
             rows = np.sort(rng.choice(rows, most, replace=False))
-        seen = samples.poses[rows, :WINDOW]
-        windows += [seen, seen[..., MIRROR, :] * np.array([-1.0, 1.0], dtype=np.float32)]
+        seen = samples.frames[rows, :WINDOW]
+        windows += [seen, mirrored(torch.from_numpy(seen)).numpy()]
         labels += [samples.labels[rows, 0]] * 2
     return np.concatenate(windows), np.concatenate(labels)
 
 
 def _flat(windows: Windows) -> Floats:
-    return windows.reshape(len(windows), WINDOW * COORDINATES).astype(np.float64)
+    return windows[:, :, :KEYPOINTS].reshape(len(windows), WINDOW * COORDINATES).astype(np.float64)
 
 
 def _folded(windows: Windows) -> Floats:
