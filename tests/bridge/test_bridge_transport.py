@@ -140,6 +140,25 @@ def test_a_killed_process_is_missed_and_its_successor_is_heard() -> None:
         wire.close()
 
 
+@pytest.mark.processes
+def test_a_frozen_process_is_missed_long_before_zenohs_own_ten_seconds() -> None:
+    config, clock = bridge_config(), SystemClock()
+    wire = ZenohTransport(config, "controller", clock)
+    alive: dict[str, bool] = {}
+    wire.watch_alive(alive.__setitem__)
+    peer = subprocess.Popen([sys.executable, "-c", PEER, config.model_dump_json()])
+    try:
+        assert until(lambda: alive.get("drive") is True)
+        os.kill(peer.pid, signal.SIGSTOP)
+        assert until(lambda: alive["drive"] is False, timeout_s=5.0)
+        os.kill(peer.pid, signal.SIGCONT)
+        assert until(lambda: alive["drive"] is True)
+    finally:
+        peer.kill()
+        peer.wait()
+        wire.close()
+
+
 def test_a_slow_reader_never_blocks_the_writer() -> None:
     config, clock = bridge_config(), SystemClock()
     writer, reader = ZenohTransport(config, "drive", clock), ZenohTransport(config, "controller", clock)
