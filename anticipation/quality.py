@@ -160,12 +160,17 @@ def judge(config: QualityConfig, status: NDArray[Any], strangeness: Floats, peop
     Args:
         config: where each factor begins to fall and where it reaches 0.
         status: (15, 12) KeypointStatus.
-        strangeness: (15,) from `PoseStatistics.strangeness`.
+        strangeness: (15,) from `PoseStatistics.strangeness`; the strangest third counts, because a skeleton that
+            broke for a moment moves in ways no person does.
         people: how many people the detector saw in the newest frame.
     """
     return Quality(
         seen=_ramp(measured_share(status), config.measured_share_zero, config.measured_share_full),
-        known=_ramp(float(strangeness.mean()), config.strangeness_zero, config.strangeness_full),
+        known=_ramp(
+            float(np.sort(strangeness)[-max(1, len(strangeness) // 3) :].mean()),
+            config.strangeness_zero,
+            config.strangeness_full,
+        ),
         alone=1.0 if people <= 1 else config.several_people,
     )
 

@@ -18,8 +18,8 @@ class QualityConfig(Section):
     """Share at and below which the quality is 0."""
     strangeness_full: float = Field(default=1.0, gt=0, le=10)
     """Distance from the training poses up to which a pose counts as seen; 3 % of those are beyond 1."""
-    strangeness_zero: float = Field(default=4.0, gt=0, le=100)
-    """Distance at and beyond which the quality is 0."""
+    strangeness_zero: float = Field(default=2.5, gt=0, le=100)
+    """Distance at and beyond which the quality is 0. The strangest third of the window is judged."""
     several_people: float = Field(default=0.6, ge=0, le=1)
     """Factor while the detector sees more than one person."""
 

@@ -249,7 +249,7 @@ def test_input_never_seen_is_not_sold_as_stable():
 
 def test_poor_quality_is_refused_and_says_what_is_poor():
     strict = predictor(AnticipationConfig(min_quality=0.9))
-    for tick in range(40):
+    for tick in range(30):
         strict.push(lost(tick, [4, 5, 10, 11], walking(tick)))
     refused = strict.predict()
     assert refused is not None

@@ -40,10 +40,19 @@ def test_what_is_no_person_is_strange(skeleton):
 
 
 def test_the_cause_is_named():
-    strange, lost = np.full(15, 3.5), np.full((15, 12), KeypointStatus.LOST)
+    strange, lost = np.full(15, 2.3), np.full((15, 12), KeypointStatus.LOST)
     assert "unlike any seen" in judge(CONFIG, MEASURED, strange, 1).cause
     assert "too few keypoints" in judge(CONFIG, lost, USUAL, 1).cause
     assert "several people" in judge(CONFIG, MEASURED, USUAL, 2).cause
+
+
+def test_a_skeleton_that_breaks_for_a_third_of_the_window_counts_at_once():
+    broken = USUAL.copy()
+    broken[4:9] = 3.0
+    assert judge(CONFIG, MEASURED, broken, 1).total == 0.0
+    broken[4:9] = USUAL[4:9]
+    broken[4] = 3.0
+    assert judge(CONFIG, MEASURED, broken, 1).total == 1.0  # one wrong tick is the detector's, not the person's
 
 
 @given(st.integers(0, 180), st.integers(0, 180), st.floats(0, 10), st.integers(0, 4))
