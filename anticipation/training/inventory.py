@@ -108,7 +108,7 @@ def describe(name: str, clips: Sequence[Clip]) -> Source:
 
 def describe_tracks(name: str, licence: str, tracks: Sequence[Track], problems: Iterable[str]) -> Source:
     """Count tracks on the 30 Hz grid."""
-    frames = sum(len(track.poses) for track in tracks)
+    frames = sum(len(track.frames) for track in tracks)
     classes = _count([track.labels for track in tracks])
     return Source(name, licence, len(tracks), frames, frames / 30.0, classes, tuple(problems))
 

@@ -20,16 +20,18 @@ from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
 
+from anticipation.centre import centre_velocity
+from anticipation.motion import ROWS
 from anticipation.training.clips import UNLABELLED, Clip, load_arrays
 from anticipation.training.own_labels import Label, label_track, read_labels
 from anticipation.training.samples import Track, clean
 from bridge.config.perception import CleaningConfig
 from bridge.errors import SourceError, SurefootError
-from bridge.messages import KEYPOINTS, STEP_S, Floats, KeypointStatus
+from bridge.messages import KEYPOINTS, STEP_S, KeypointStatus
 from bridge.messages import Keypoints as Message
 from bridge.record.reader import Recording
 from bridge.topics import KEYPOINTS as KEYPOINTS_TOPIC
-from perception.features import relative
+from perception.features import relative, upper_body_centre
 
 LABELS: Final = "labels.csv"
 SOURCE: Final = "own"
@@ -94,13 +96,13 @@ def _labelled(track: Track, label: Label | None) -> Track:
     """
     if label is None:
         return track
-    duration_s = len(track.poses) * STEP_S
+    duration_s = len(track.frames) * STEP_S
     times = [time for time in (label.onset_s, label.lying_s, label.up_s) if time is not None]
     if times and times[-1] > duration_s:
         raise SourceError(f"{LABELS}: '{track.name}' lasts {duration_s:.1f} s, a label is at {times[-1]:.1f} s")
     group = f"{SOURCE}/{label.person}" if label.person else track.group
-    labels = label_track(len(track.poses), label)
-    return Track(track.name, group, track.source, track.poses, track.whole, track.body_px, labels)
+    labels = label_track(len(track.frames), label)
+    return Track(track.name, group, track.source, track.frames, track.whole, track.body_px, labels)
 
 
 def _read_npz(path: Path, cleaning: CleaningConfig, problems: list[str]) -> list[Track]:
@@ -145,12 +147,16 @@ def track_of(messages: list[Message], name: str) -> Track:
     if np.diff(ticks, prepend=0).max() >= LONGEST_GAP:
         raise SourceError(f"{name}: a gap of {np.diff(ticks).max() * STEP_S:.0f} s, limit {LONGEST_GAP * STEP_S:.0f} s")
     count = int(ticks[-1]) + 1
-    poses, body = np.full((count, KEYPOINTS, 2), np.nan), np.full(count, np.nan)
+    positions, body = np.full((count, KEYPOINTS, 2), np.nan), np.full(count, np.nan)
     whole = np.zeros(count, dtype=bool)
     for tick, message in zip(ticks, messages, strict=True):
         there = message.valid and message.body_length_px > 0 and (message.status != KeypointStatus.LOST).all()
         if there and np.isfinite(message.position_px).all():
-            pose: Floats = relative(message.position_px, message.body_length_px)
-            poses[tick], body[tick], whole[tick] = pose, message.body_length_px, True
+            positions[tick], body[tick], whole[tick] = message.position_px, message.body_length_px, True
+    centres = upper_body_centre(positions)
+    before = np.concatenate([np.full((1, 2), np.nan), centres[:-1]])
+    frames = np.full((count, ROWS, 2), np.nan)
+    frames[whole, :KEYPOINTS] = relative(positions[whole], body[whole])
+    frames[:, KEYPOINTS] = centre_velocity(centres, before, body)
     labels = np.full(count, UNLABELLED, dtype=np.int64)
-    return Track(name, f"{SOURCE}/{name}", SOURCE, poses, whole, body, labels)
+    return Track(name, f"{SOURCE}/{name}", SOURCE, frames, whole, body, labels)
