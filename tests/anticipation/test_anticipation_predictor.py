@@ -249,8 +249,8 @@ def test_input_never_seen_is_not_sold_as_stable():
 
 def test_poor_quality_is_refused_and_says_what_is_poor():
     strict = predictor(AnticipationConfig(min_quality=0.9))
-    for tick in range(30):
-        strict.push(lost(tick, [4, 5, 10, 11], walking(tick)))
+    for tick in range(35):  # seen for half a second, then held where they were
+        strict.push(message(tick, walking(tick)) if tick < 15 else lost(tick, [4, 5, 10, 11], walking(tick)))
     refused = strict.predict()
     assert refused is not None
     assert not refused.valid
