@@ -23,7 +23,7 @@ format: $(VENV)/.dev
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-bench: $(VENV)/.dev
+bench: $(VENV)/.bench
 	$(BIN)/python -m benchmarks.mpc --json runs/bench/mpc.json
 	$(BIN)/python -m benchmarks.anticipation --json runs/bench/anticipation.json
 	$(BIN)/python -m benchmarks.wire --json runs/bench/wire.json
@@ -63,4 +63,9 @@ $(VENV)/.base: pyproject.toml constraints.txt
 $(VENV)/.dev: $(VENV)/.base
 	@echo "installing what tests and lint need"
 	@$(PIP) install --quiet -c constraints.txt -e '.[dev]'
+	@touch $@
+
+$(VENV)/.bench: $(VENV)/.dev
+	@echo "installing the solvers that the benchmark compares with"
+	@$(PIP) install --quiet -c constraints.txt -e '.[dev,bench]'
 	@touch $@

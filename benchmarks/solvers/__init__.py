@@ -1,0 +1,1 @@
+"""Other solvers on the controller's own problems."""
