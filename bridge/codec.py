@@ -1,4 +1,4 @@
-"""Messages to CDR and back, through the type store of `rosbags`.
+"""Messages to CDR and back: written by `bridge.cdr`, read through the type store of `rosbags`.
 
 The wire carries ROS 2 CDR only; whatever does not decode to a whole, well-formed
 message is an `InvalidMessage`, never a partial value.
@@ -16,6 +16,7 @@ import numpy as np
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from bridge.cdr import WRITERS
 from bridge.clock import NS
 from bridge.errors import InvalidMessage
 from bridge.messages import (
@@ -47,12 +48,6 @@ def _make_store() -> Any:
 
 
 TYPES: Final = _make_store()
-_T: Final = TYPES.types
-_Time = _T["builtin_interfaces/msg/Time"]
-_Header = _T["std_msgs/msg/Header"]
-_Vector3 = _T["geometry_msgs/msg/Vector3"]
-_Twist = _T["geometry_msgs/msg/Twist"]
-_COVARIANCE = np.zeros(36)
 
 
 def prepare(topic: Topic) -> None:
@@ -60,9 +55,10 @@ def prepare(topic: Topic) -> None:
     TYPES.get_msgdef(topic.ros_type)
 
 
-def encode(topic: Topic, message: Message) -> bytes:
-    """Return `message` as the CDR bytes that `topic` carries."""
-    return bytes(TYPES.serialize_cdr(_ENCODERS[topic.ros_type](message), topic.ros_type))
+def encode(topic: Topic, message: Message, sequence: int | None = None) -> bytes:
+    """Return `message` as the CDR bytes that `topic` carries, under its own number or under `sequence`."""
+    number = message.sequence if sequence is None else sequence
+    return WRITERS[topic.ros_type](message, number)
 
 
 def decode(topic: Topic, payload: bytes, sequence: int = 0) -> Any:
@@ -100,42 +96,14 @@ def _require_flag(payload: bytes) -> None:
         raise InvalidMessage(f"valid is {flag}, limits 0..1")
 
 
-def _time(stamp_ns: int) -> Any:
-    return _Time(sec=int(stamp_ns // NS), nanosec=int(stamp_ns % NS))
-
-
-def _header(stamp_ns: int, frame_id: str) -> Any:
-    return _Header(stamp=_time(stamp_ns), frame_id=frame_id)
-
-
 def _ns(stamp: Any) -> int:
     if stamp.nanosec >= NS:
         raise InvalidMessage(f"stamp has {stamp.nanosec} ns beside its seconds, limit {NS - 1}")
     return int(stamp.sec) * NS + int(stamp.nanosec)
 
 
-def _vector(values: Any) -> Any:
-    return _Vector3(x=float(values[0]), y=float(values[1]), z=float(values[2]))
-
-
 def _xyz(vector: Any) -> tuple[float, float, float]:
     return (vector.x, vector.y, vector.z)
-
-
-def _encode_keypoints(m: Keypoints) -> Any:
-    return _T["surefoot_msgs/msg/Keypoints"](
-        header=_header(m.stamp_ns, m.frame_id),
-        sequence=m.sequence,
-        valid=m.valid,
-        reason=m.reason,
-        image_width=m.image_width,
-        image_height=m.image_height,
-        position_px=m.position_px.ravel(),
-        confidence=m.confidence,
-        status=m.status,
-        body_length_px=float(m.body_length_px),
-        people=m.people,
-    )
 
 
 def _decode_keypoints(raw: Any, _sequence: int) -> Keypoints:
@@ -155,24 +123,6 @@ def _decode_keypoints(raw: Any, _sequence: int) -> Keypoints:
     )
 
 
-def _encode_horizon(m: FallHorizon) -> Any:
-    return _T["surefoot_msgs/msg/FallHorizon"](
-        header=_header(m.stamp_ns, m.frame_id),
-        sequence=m.sequence,
-        valid=m.valid,
-        reason=m.reason,
-        step_s=float(m.step_s),
-        quality=float(m.quality),
-        probabilities=m.probabilities.ravel(),
-        distance=m.distance,
-        distance_rate=m.distance_rate,
-        time_to_boundary=m.time_to_boundary,
-        centre_distance=m.centre_distance.ravel(),
-        plane=m.plane.ravel(),
-        forecast_px=m.forecast_px.ravel(),
-    )
-
-
 def _decode_horizon(raw: Any, _sequence: int) -> FallHorizon:
     return FallHorizon(
         stamp_ns=_ns(raw.header.stamp),
@@ -189,33 +139,6 @@ def _decode_horizon(raw: Any, _sequence: int) -> FallHorizon:
         centre_distance=raw.centre_distance,
         plane=raw.plane,
         forecast_px=raw.forecast_px,
-    )
-
-
-def _twist(m: SupportCommand) -> Any:
-    vx, vy, yaw_rate, column = m.velocity
-    return _Twist(linear=_vector((vx, vy, column)), angular=_vector((0.0, 0.0, yaw_rate)))
-
-
-def _encode_command(m: SupportCommand) -> Any:
-    return _T["surefoot_msgs/msg/SupportCommand"](
-        header=_header(m.stamp_ns, m.frame_id),
-        sequence=m.sequence,
-        valid=m.valid,
-        reason=m.reason,
-        rests_on=_time(m.rests_on_ns),
-        lifetime_s=float(m.lifetime_s),
-        state=m.state.value,
-        twist=_twist(m),
-        acceleration=m.acceleration,
-        column_height=float(m.column_height),
-        stiffening=float(m.stiffening),
-        damping=m.damping,
-        stiffness=m.stiffness,
-        fall_distance=float(m.fall_distance),
-        fall_probability=float(m.fall_probability),
-        solver=m.solver,
-        solve_time_s=float(m.solve_time_s),
     )
 
 
@@ -243,17 +166,8 @@ def _decode_command(raw: Any, _sequence: int) -> SupportCommand:
     )
 
 
-def _encode_twist_stamped(m: SupportCommand) -> Any:
-    return _T["geometry_msgs/msg/TwistStamped"](header=_header(m.stamp_ns, m.frame_id), twist=_twist(m))
-
-
 def _refuse_twist_stamped(_raw: Any, _sequence: int) -> Any:
     raise InvalidMessage("cmd_vel is written for foreign bases only; read support_command")
-
-
-def _encode_wrench(m: Wrench) -> Any:
-    wrench = _T["geometry_msgs/msg/Wrench"](force=_vector(m.force), torque=_vector(m.torque))
-    return _T["geometry_msgs/msg/WrenchStamped"](header=_header(m.stamp_ns, m.frame_id), wrench=wrench)
 
 
 def _decode_wrench(raw: Any, sequence: int) -> Wrench:
@@ -263,19 +177,6 @@ def _decode_wrench(raw: Any, sequence: int) -> Wrench:
         force=np.array(_xyz(raw.wrench.force)),
         torque=np.array(_xyz(raw.wrench.torque)),
         sequence=sequence,
-    )
-
-
-def _encode_odometry(m: Odometry) -> Any:
-    point = _T["geometry_msgs/msg/Point"](*(float(v) for v in m.position))
-    turn = _T["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=math.sin(m.yaw / 2.0), w=math.cos(m.yaw / 2.0))
-    pose = _T["geometry_msgs/msg/Pose"](position=point, orientation=turn)
-    twist = _Twist(linear=_vector(m.velocity), angular=_vector((0.0, 0.0, m.yaw_rate)))
-    return _T["nav_msgs/msg/Odometry"](
-        header=_header(m.stamp_ns, m.frame_id),
-        child_frame_id=m.child_frame_id,
-        pose=_T["geometry_msgs/msg/PoseWithCovariance"](pose=pose, covariance=_COVARIANCE),
-        twist=_T["geometry_msgs/msg/TwistWithCovariance"](twist=twist, covariance=_COVARIANCE),
     )
 
 
@@ -297,18 +198,6 @@ def _decode_odometry(raw: Any, sequence: int) -> Odometry:
     )
 
 
-def _encode_status(m: NodeStatus) -> Any:
-    key_value = _T["diagnostic_msgs/msg/KeyValue"]
-    status = _T["diagnostic_msgs/msg/DiagnosticStatus"](
-        level=m.level,
-        name=f"surefoot: {m.role}",
-        message=m.summary,
-        hardware_id=m.role,
-        values=[key_value(key=key, value=value) for key, value in m.values.items()],
-    )
-    return _T["diagnostic_msgs/msg/DiagnosticArray"](header=_header(m.stamp_ns, ""), status=[status])
-
-
 def _decode_status(raw: Any, sequence: int) -> NodeStatus:
     if len(raw.status) != 1:
         raise InvalidMessage(f"diagnostics has {len(raw.status)} statuses, expected 1")
@@ -323,15 +212,6 @@ def _decode_status(raw: Any, sequence: int) -> NodeStatus:
     )
 
 
-_ENCODERS: Final[dict[str, Callable[[Any], Any]]] = {
-    "surefoot_msgs/msg/Keypoints": _encode_keypoints,
-    "surefoot_msgs/msg/FallHorizon": _encode_horizon,
-    "surefoot_msgs/msg/SupportCommand": _encode_command,
-    "geometry_msgs/msg/TwistStamped": _encode_twist_stamped,
-    "geometry_msgs/msg/WrenchStamped": _encode_wrench,
-    "nav_msgs/msg/Odometry": _encode_odometry,
-    "diagnostic_msgs/msg/DiagnosticArray": _encode_status,
-}
 _DECODERS: Final[dict[str, Callable[[Any, int], Any]]] = {
     "surefoot_msgs/msg/Keypoints": _decode_keypoints,
     "surefoot_msgs/msg/FallHorizon": _decode_horizon,

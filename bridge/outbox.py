@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
-
 from bridge.codec import encode, prepare
 from bridge.messages import Message
 from bridge.topics import Topic
@@ -27,8 +24,7 @@ class Outbox:
 
     def send(self, message: Message) -> None:
         """Send `message` under the next sequence number."""
-        numbered: Any = message
-        self._publisher.put(encode(self._topic, replace(numbered, sequence=self._sequence)), message.stamp_ns)
+        self._publisher.put(encode(self._topic, message, self._sequence), message.stamp_ns)
         self._sequence += 1
 
     def close(self) -> None:
