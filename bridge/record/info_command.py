@@ -24,6 +24,8 @@ def info(
     """Say what is in a recording: per topic how many, how regular, how old on arrival, and what is missing.
 
     Reads files that were cut off as far as they go, and says so.
+
+    Example: surefoot info walk.mcap --json
     """
     found = summarise(Recording(file))
     typer.echo(json.dumps(_plain(found), indent=2) if as_json else _text(found))

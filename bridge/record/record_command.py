@@ -38,6 +38,8 @@ def record(
     Only listens: whatever happens to it, the running control notices nothing. Ends with Ctrl-C,
     SIGTERM or after --duration, and finishes the file; killed at any point, it leaves everything
     readable but the last second at most. Exit code 2: the file cannot be written (any more).
+
+    Example: surefoot record --out walk.mcap --duration 60
     """
     loaded = load_config(config_path(config), set_ or [])
     wanted = parse_topics(topics) if topics is not None else TOPICS

@@ -59,6 +59,8 @@ def replay(
     Without --only the recorded messages are published with their stamps moved to now, in the place
     of the processes that published them; none of these may be running. With --only ROLE that process
     is started and fed what it reads; what it publishes goes to --out.
+
+    Example: surefoot replay walk.mcap --only controller --as-fast-as-possible --out again.mcap
     """
     recording = Recording(file)
     path = config_path(config)

@@ -87,6 +87,15 @@ def test_with_an_expired_certificate(site: Site, monkeypatch: pytest.MonkeyPatch
     refused_at_the_door(site, tls, site.endpoint("controller"), "invalid peer certificate: certificate expired")
 
 
+def test_a_certificate_that_ends_while_it_is_used(site: Site) -> None:
+    lasts_days = 4.0 / 86400.0
+    write_pair(site.keys, "brief", issue(site.authority, "observer", [], lasts_days))  # type: ignore[arg-type]
+    with closing(session(site.endpoint("controller"), tls_of(site.keys, "brief"))) as attacker:
+        wait_until(attacker.info.links, "the certificate is good")
+        wait_until(lambda: not attacker.info.links(), "the link is closed when it ends")
+        site.knows("refused: a connection: invalid peer certificate: certificate expired")
+
+
 def test_without_encryption(site: Site) -> None:
     plain = site.endpoint("controller").replace("tls/", "tcp/")
     refused_at_the_door(site, None, plain, "received corrupt message")

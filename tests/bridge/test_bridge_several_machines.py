@@ -16,8 +16,9 @@ import pytest
 from bridge_network import Relay
 from bridge_recordings import horizon
 from bridge_site import QUIET, Feed, Node, Statuses, make_keys
-from bridge_toys import free_ports, wait_until
+from bridge_toys import free_ports, listening, wait_until
 
+from bridge.cli import main
 from bridge.clock import SystemClock
 from bridge.config.bridge import BridgeConfig
 from bridge.config.load import load_config
@@ -195,6 +196,16 @@ def test_one_router_joins_a_client_and_peers() -> None:
         with closing(open_session(routing, "router")):
             wait_until(heard, "both ways through the new router")
             wait_until(lambda: alive["controller"] is True, "the far side sees the controller again")
+
+
+def test_a_router_whose_port_is_taken_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    port = free_ports(1)[0]
+    with listening(port):
+        assert main(["router", "--set", f"bridge.router.listen=['tcp/127.0.0.1:{port}']"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert f"router cannot listen on tcp/127.0.0.1:{port}: the port is in use" in error
+    assert "bridge.router.listen" in error
 
 
 NAMESPACES = """
