@@ -19,10 +19,11 @@ from bridge.config.walker import WalkerConfig
 from bridge.errors import ConfigError, InvalidMessage
 from bridge.messages import Floats, Odometry, SupportCommand, Wrench
 from controller.admittance import Admittance, AdmittanceStages
+from controller.balance import TipLimits, no_limits, upright
 from controller.commanded_motion import CommandedMotion
 from controller.fallback import fallback_acceleration, stop_acceleration, within_machine
 from controller.interface import Decision
-from controller.machine_limits import MachineLimits
+from controller.machine_limits import TIP_ROWS, MachineLimits
 from controller.motion_limits import MotionLimits
 from controller.mpc.assembly import Instant
 from controller.mpc.plan import Failure, Plan
@@ -58,6 +59,7 @@ class _Choice(NamedTuple):
     solver: Solver
     wanted: Floats
     rendered: _Rendered | None  # None in a stop
+    tip: TipLimits
     reason: str = ""
     solve_time_s: float = 0.0
 
@@ -128,10 +130,12 @@ class AdmittanceController:
         inputs = self._take(now_ns, odometry, wrench, decision)
         motion = self._motion
         choice = self._choose(now_ns, inputs, decision)
-        acceleration = self._limits.clamp(
-            choice.wanted, motion.velocity, motion.acceleration, float(motion.pose[3]), inputs.span_s
-        )
         before = motion.velocity
+
+        def clamp(wanted: Floats) -> Floats:
+            return self._limits.clamp(wanted, before, motion.acceleration, float(motion.pose[3]), inputs.span_s)
+
+        acceleration = upright(choice.wanted, choice.tip, clamp)
         motion.advance(acceleration, inputs.span_s)
         law = choice.rendered
         if law is not None:
@@ -197,7 +201,7 @@ class AdmittanceController:
         """Return what the best law that can be had asks for."""
         motion = self._motion
         if not self._started:
-            return _Choice("stop", np.zeros(4), None, "no usable odometry yet")
+            return _Choice("stop", np.zeros(4), None, no_limits(), "no usable odometry yet")
         if decision.stop:
             return self._stop(inputs)
 
@@ -212,7 +216,8 @@ class AdmittanceController:
                 self._last_solved_ns = now_ns
                 self.last_plan = outcome
                 wanted = outcome.acceleration[0]
-                return _Choice("mpc", wanted, _Rendered(law, force), solve_time_s=outcome.solve_time_s)
+                tip = TipLimits(*self._predictive.tip_limits)
+                return _Choice("mpc", wanted, _Rendered(law, force), tip, solve_time_s=outcome.solve_time_s)
             failure = outcome
         without_s = seconds(now_ns - self._last_solved_ns)
         if without_s > self._config.fallback_max_s:
@@ -220,22 +225,24 @@ class AdmittanceController:
             reason = f"{failure.reason}; {reason}" if failure.reason else reason
             return self._stop(inputs, reason, failure.solve_time_s)
         wanted = fallback_acceleration(law, force, motion.velocity, self._period_s)
-        rendered = _Rendered(law, force)
-        return _Choice("fallback", self._allowed(wanted, inputs), rendered, failure.reason, failure.solve_time_s)
+        allowed, tip = self._allowed(wanted, inputs)
+        return _Choice("fallback", allowed, _Rendered(law, force), tip, failure.reason, failure.solve_time_s)
 
     def _stop(self, inputs: _Inputs, reason: str = "", solve_time_s: float = 0.0) -> _Choice:
         # The spring is let go: stiffening anew anchors it where the walker comes to rest.
         self._admittance.release()
         wanted = stop_acceleration(self._motion.velocity, self._limits, inputs.span_s)
-        return _Choice("stop", self._allowed(wanted, inputs), None, reason, solve_time_s)
+        allowed, tip = self._allowed(wanted, inputs)
+        return _Choice("stop", allowed, None, tip, reason, solve_time_s)
 
-    def _allowed(self, wanted: Floats, inputs: _Inputs) -> Floats:
+    def _allowed(self, wanted: Floats, inputs: _Inputs) -> tuple[Floats, TipLimits]:
         """Return what the machine can do of `wanted`: the plan's own limits, counted without its code."""
         motion, machine = self._motion, self._machine
         terms = self._walker.evaluate(float(motion.pose[3]), motion.velocity)
         machine.linearise(terms)
         bounds = machine.bounds(terms, inputs.wrench, self._fading[:1])
-        return within_machine(wanted, machine.give_way(terms, inputs.wrench, bounds), machine.rows, bounds)
+        allowed = within_machine(wanted, machine.give_way(terms, inputs.wrench, bounds), machine.rows, bounds)
+        return allowed, TipLimits(machine.rows[TIP_ROWS], bounds.high[0, TIP_ROWS])
 
 
 def _fault(message: Odometry | Wrench) -> str:

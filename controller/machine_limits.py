@@ -27,8 +27,8 @@ DRIVE_ROWS = slice(0, 8)
 TIP_ROWS = slice(8, 12)
 ROWS = 12
 _COLUMN = slice(2 * ROWS + 3, None, 4)  # the column's two limits among all
-# Part of the rectangle given away so that the stated one is kept whole: by as much a plan may leave it.
-_SPARE = 0.03
+# Part of the support rectangle given away so that the stated one is kept whole: by as much a plan may leave it.
+SPARE = 0.03
 _TIP_FRONT, _TIP_REAR, _TIP_LEFT, _TIP_RIGHT = 8, 9, 10, 11
 
 
@@ -54,12 +54,12 @@ class MachineLimits:
         acceleration: (4,) largest accelerations.
     """
 
-    def __init__(self, walker: Walker) -> None:
+    def __init__(self, walker: Walker, spare: float = SPARE) -> None:
         config = walker.config
         self._walker = walker
         self._weight = walker.weight
         stated = np.array([0.5 * config.wheelbase_m, 0.5 * config.track_m]) - config.support_margin_m
-        self._half = (1.0 - _SPARE) * stated
+        self._half = (1.0 - spare) * stated
         self.column_force = config.column_force_max_n
         self.acceleration: Floats = np.array(config.acceleration_max)
         # The column's own acceleration may take this much load off the floor; the rest grips.
