@@ -1,13 +1,16 @@
-"""A piece of bad network: a TCP relay that delays, loses connections, or swallows everything when told to."""
+"""A piece of bad network: a TCP relay that delays, loses packets or connections, or swallows all when told to."""
 
 from __future__ import annotations
 
 import contextlib
+import random
 import selectors
 import socket
 import threading
 import time
 from collections import deque
+
+RETRANSMISSION_S = 0.2  # the shortest after which Linux sends a lost TCP segment again
 
 
 class Relay:
@@ -16,6 +19,7 @@ class Relay:
     Attributes:
         address: where it listens, such as `127.0.0.2:4711`.
         delay_s: how late every byte arrives.
+        loss: share of what is sent that is lost: it comes one retransmission later, and what follows waits for it.
         swallow: while set, nothing is carried and nothing is closed, as when a cable is pulled.
     """
 
@@ -23,7 +27,8 @@ class Relay:
         self._target = target
         self._listener = socket.create_server((host, 0))
         self.address = "{}:{}".format(*self._listener.getsockname())
-        self.delay_s, self.carried = 0.0, 0
+        self.delay_s, self.loss, self.carried, self.lost = 0.0, 0.0, 0, 0
+        self._dice = random.Random(0)
         self.swallow = False
         self._pairs: list[_Pair] = []
         self._cut = threading.Event()
@@ -85,7 +90,11 @@ class Relay:
             self._drop(selector, [pair])
             return
         self.carried += len(data)
-        pair.waiting.append((time.monotonic() + self.delay_s, pair.other(end), data))
+        due_s = time.monotonic() + self.delay_s
+        if self._dice.random() < self.loss:
+            due_s += RETRANSMISSION_S
+            self.lost += 1
+        pair.waiting.append((due_s, pair.other(end), data))
 
     def _drop(self, selector: selectors.BaseSelector, pairs: list[_Pair]) -> None:
         for pair in pairs:

@@ -5,18 +5,25 @@ from __future__ import annotations
 import subprocess
 import sys
 import textwrap
+from contextlib import ExitStack, closing
+from pathlib import Path
 from typing import Any, Literal
 
 import pytest
 import zenoh
+from bridge_site import make_keys
+from bridge_toys import free_ports, wait_until
 
+from bridge.clock import SystemClock
 from bridge.config.bridge import BridgeConfig
 from bridge.keys.identity import IDENTITIES, OBSERVER, PUBLISHERS, ROUTER
 from bridge.refusals import Refusals
-from bridge.topics import DIAGNOSTICS, TOPICS, Topic
+from bridge.topics import DIAGNOSTICS, TOPICS, WRENCH, Topic
 from bridge.transport.access import access_control
+from bridge.transport.interface import Sample
 from bridge.transport.names import Names, names_of
 from bridge.transport.wire_log import Digest
+from bridge.transport.zenoh import ZenohTransport
 
 Naming = Literal["ros2dds", "rmw_zenoh"]
 
@@ -99,6 +106,40 @@ def test_nodes_show_themselves_to_ros2_and_nobody_else() -> None:
             assert node is not None
             allowed = rules.allows(identity, "liveliness_token", node.token())
             assert allowed == (identity in (role, OBSERVER, ROUTER))  # an observer's node may have any name
+
+
+@pytest.mark.parametrize("naming", ["ros2dds", "rmw_zenoh"])
+def test_the_rules_let_the_system_work(tmp_path: Path, naming: Naming) -> None:
+    """Certificates, rules and both namings on a real wire: topics, lives and, for ROS 2, the graph."""
+    make_keys(tmp_path / "keys")
+    ports = dict(zip(("perception", "anticipation", "controller", "drive"), free_ports(4), strict=True))
+    endpoints = {role: f"tls/127.0.0.1:{port}" for role, port in ports.items()}
+    config = BridgeConfig(keys=str(tmp_path / "keys"), endpoints=endpoints, naming=naming)
+    clock, graph = SystemClock(), set[str]()
+    with ExitStack() as stack:
+        drive, controller, viewer = (
+            stack.enter_context(closing(ZenohTransport(config, role, clock)))
+            for role in ("drive", "controller", "view")
+        )
+        heard: dict[str, list[Sample]] = {"controller": [], "view": []}
+        for transport, role in ((controller, "controller"), (viewer, "view")):
+            transport.subscribe(WRENCH, heard[role].append)
+        alive: dict[str, bool] = {}
+        viewer.watch_alive(alive.__setitem__)
+        ros2 = viewer.session.liveliness().declare_subscriber(
+            "@ros2_lv/0/**", lambda sample: graph.add(str(sample.key_expr)), history=True
+        )
+        controller.declare_alive("controller")
+        publisher = drive.publisher(WRENCH)
+        wait_until(lambda: publisher.put(b"x", 0) or all(heard.values()), "both hear the drive")
+        wait_until(lambda: alive.get("controller") is True, "the viewer sees that the controller lives")
+        if naming == "rmw_zenoh":
+            wait_until(lambda: sum("/MS/" in token for token in graph) == 2, "both subscriptions are in the graph")
+            wait_until(lambda: sum("/MP/" in token for token in graph) == 1, "and the publisher")
+            assert sum("/NN/" in token for token in graph) == 3
+        else:
+            assert graph == set()
+        ros2.undeclare()
 
 
 # what Zenoh 1.10 writes

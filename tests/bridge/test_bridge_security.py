@@ -88,7 +88,7 @@ def test_with_an_expired_certificate(site: Site, monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_certificate_that_ends_while_it_is_used(site: Site) -> None:
-    lasts_days = 4.0 / 86400.0
+    lasts_days = 2.5 / 86400.0
     write_pair(site.keys, "brief", issue(site.authority, "observer", [], lasts_days))  # type: ignore[arg-type]
     with closing(session(site.endpoint("controller"), tls_of(site.keys, "brief"))) as attacker:
         wait_until(attacker.info.links, "the certificate is good")

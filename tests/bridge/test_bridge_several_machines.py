@@ -71,7 +71,9 @@ class TwoHosts:
             self.routers = {name: self._stack.enter_context(closing(self.router(name))) for name in self.files}
             words = ["--config", str(self.files["walker"]), "--option", "controller=log"]
             words += [word for pair in self.overrides["walker"] for word in ("--set", pair)]
-            self._stack.enter_context(closing(Node("controller.node", folder / "controller.log", words)))
+            self.controller = self._stack.enter_context(
+                closing(Node("controller.node", folder / "controller.log", words))
+            )
             self.feed = self._stack.enter_context(closing(Feed(config["camera"], config["walker"])))
             self.statuses = self._stack.enter_context(closing(Statuses(config["walker"])))
             self.far_statuses = self._stack.enter_context(closing(Statuses(config["camera"])))
@@ -135,7 +137,7 @@ def test_a_partition_stops_the_walker_and_healing_is_enough(hosts: TwoHosts, tro
 def test_broken_connections_are_made_again(hosts: TwoHosts) -> None:
     hosts.follows()
     accepted = hosts.feed.sent(FALL_HORIZON)
-    for _ in range(5):
+    for _ in range(3):
         hosts.relay.cut()
         carried = hosts.relay.carried
         wait_until(lambda carried=carried: hosts.relay.carried > carried + 50_000, "the link is back")
@@ -151,6 +153,19 @@ def test_delay_is_seen_as_age_and_too_much_of_it_stops(hosts: TwoHosts) -> None:
     assert re.search(r"ms old, limit 150", hosts.stops())
     hosts.relay.delay_s = 0.0
     hosts.follows()
+
+
+def test_loss_is_lateness_and_never_a_wrong_order(hosts: TwoHosts) -> None:
+    hosts.follows()
+    hosts.statuses.seen.clear()
+    before = hosts.relay.lost
+    hosts.relay.loss = 0.1
+    wait_until(lambda: hosts.relay.lost >= before + 6, "some packets are lost")
+    hosts.relay.loss = 0.0
+    hosts.follows()
+    seen = {status.values["state"] for status in hosts.statuses.seen}
+    assert seen <= {"FOLLOW", "GUARD", "SAFE_STOP", "RECOVER"}
+    assert "old message" not in hosts.controller.said
 
 
 def peer(role: str, port: int, router: str) -> BridgeConfig:
