@@ -11,6 +11,7 @@ from bridge.transport.access import access_control
 from bridge.transport.names import names_of
 
 MAX_MESSAGE_BYTES: Final = 1 << 20  # longer ones are dropped before they are put together
+QUEUE: Final = 16  # the most Zenoh allows: half a second of keypoints or horizons while a reader gets no time
 
 
 def zenoh_settings(config: BridgeConfig, role: str, credentials: Credentials | None) -> dict[str, Any]:
@@ -42,6 +43,9 @@ def zenoh_settings(config: BridgeConfig, role: str, credentials: Credentials | N
         "transport/link/tx/keep_alive": 4,
         "transport/link/rx/max_message_size": MAX_MESSAGE_BYTES,
         "transport/shared_memory/enabled": False,
+        # a sample that is sent at once takes a place of its own, and by default two are all there are
+        "transport/link/tx/queue/size/interactive_high": QUEUE,
+        "transport/link/tx/queue/size/data_low": QUEUE,
     }
     if credentials is not None:
         settings["transport/link/tls"] = _tls(credentials)
