@@ -32,8 +32,12 @@ class Command(NamedTuple):
 
 COMMANDS: Final = {
     "up": Command("bridge.launch.command:up", "Run the processes and watch over them."),
+    "codegen": Command("controller.mpc.export.command:codegen", "Write the MPC as C for a real-time target."),
     "config": Command("bridge.config.command:config", "Print a configuration file with every key and its meaning."),
-    "demo": Command("bridge.launch.demo:demo", "Run it all on a generated stumble; print a timeline, draw a picture."),
+    "demo": Command(
+        "simulation.trial.command:demo", "A simulated person is pushed, with help and without."
+    ),
+    "rehearse": Command("bridge.launch.rehearse:rehearse", "Run it all on a recorded stumble, without physics."),
     "assess": Command("bridge.assess.command:assess", "Assess keypoint clips offline with the code that runs live."),
     "latency": Command("bridge.latency.command:latency", "Measure newest frame to command on the wire, hop by hop."),
     "record": Command("bridge.record.record_command:record", "Record what is on the wire into an MCAP file."),
@@ -44,6 +48,7 @@ COMMANDS: Final = {
     "router": Command("bridge.launch.router:router", "Join the processes of several machines."),
     "data": Command("anticipation.training.data_command:data", "List and check the data there is to train on."),
     "train": Command("anticipation.training.commands:train", "Train the anticipation networks."),
+    "export": Command("anticipation.export_command:export", "Write the networks as an ONNX graph."),
     "evaluate": Command(
         "anticipation.training.evaluation.command:evaluate", "Measure the anticipation, split by sequence."
     ),

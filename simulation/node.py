@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -17,8 +19,8 @@ from bridge.clock import NS, nanoseconds
 from bridge.config.simulation import SimulationConfig
 from bridge.errors import ConfigError
 from bridge.inbox import Inbox
-from bridge.messages import Keypoints, KeypointStatus, NodeStatus, Odometry, SupportCommand, Wrench
-from bridge.node import Node, NodeContext, main
+from bridge.messages import GaitState, Keypoints, KeypointStatus, NodeStatus, Odometry, SupportCommand, Wrench
+from bridge.node import Factory, Node, NodeContext, main
 from bridge.outbox import Outbox
 from bridge.timing import LoopTiming
 from bridge.topics import DETECTIONS, ODOMETRY, SUPPORT_COMMAND, WRENCH
@@ -26,6 +28,7 @@ from controller.gate import GateLimits, SafetyGate
 from simulation.person.person import CONTROL_S
 from simulation.scenarios.scenario import Performance
 from simulation.scenarios.single import scenario_from
+from simulation.trial.trace import TraceWriter
 from simulation.world.camera import Detector, RobotCamera
 from simulation.world.parameters import WalkerParameters
 from simulation.world.world import sensed
@@ -39,8 +42,10 @@ class SimulationNode:
 
     def __init__(self, context: NodeContext, performance: Performance | None = None) -> None:
         """Set the scene of `[simulation]`, or take over a `performance` that was made elsewhere."""
-        config = _with_options(context)
+        config, trace = _with_options(context)
+        self._trace = TraceWriter(Path(trace)) if trace else None
         self._performance = Performance(scenario_from(config)) if performance is None else performance
+        self._performance.waiting = config.begins == "armed"
         self.world = self._performance.world
         self._period_s = 1.0 / config.rate_hz
         self._gate = SafetyGate(
@@ -58,7 +63,8 @@ class SimulationNode:
         self._detector = Detector(self._camera, np.random.default_rng(seeds[0]))
         self._noise = np.random.default_rng(seeds[1])
         self._parameters = WalkerParameters()
-        self._bias = self._parameters.force_bias_n * self._noise.normal(size=3)
+        offset = self._performance.scenario.faults.force_offset_n
+        self._bias = self._parameters.force_bias_n * self._noise.normal(size=3) + offset
         self._timing = LoopTiming(self._period_s)
         self._waiting: deque[tuple[int, Keypoints]] = deque()
         self._start_ns: int | None = None
@@ -92,23 +98,29 @@ class SimulationNode:
             velocity = (vx, vy, yaw_rate, column)
         while self._world_ns + TURN_NS <= now_ns:
             self._performance.advance(velocity)
+            if self._trace is not None:
+                self._trace.note(self._performance, self._world_ns + TURN_NS)
             self._world_ns += TURN_NS
             self._expose()
         reading = self._commands.read(now_ns)
         self._age_s = reading.age_s
         # the inbox keeps the newest command even when it is stale: the gate lets it expire and says so
         self._executed = self._gate.filter(reading.message, now_ns)
+        if self._executed.valid and self._executed.state is GaitState.FOLLOW:
+            self._performance.waiting = False
         self._say(now_ns)
 
     def wait(self) -> None:
         """Nothing to wait for: the loop has a period."""
 
     def finished(self) -> bool:
-        """The world goes on until it is told to stop."""
-        return False
+        """Whether the trial that is traced is over; without a trace the world goes on until it is told to stop."""
+        return self._trace is not None and self._performance.time_s >= self._performance.scenario.duration_s
 
     def close(self) -> None:
-        """Nothing is held that the transport does not close."""
+        """Write the trace, if one was asked for with the option `trace=FILE`."""
+        if self._trace is not None:
+            self._trace.save()
 
     def status(self, now_ns: int) -> NodeStatus:
         """Return rate, age of the command, and how person and walker are."""
@@ -141,6 +153,8 @@ class SimulationNode:
         odometry = self.world.odometry()
         x, y, _ = odometry.position
         points, depth = self._camera.project(self.world.keypoints(), (x, y, odometry.yaw))
+        if self._performance.scenario.faults.blind(self.world.time_s):
+            points = np.full_like(points, np.nan)
         seen = self._detector.observe(points, depth)
         lost = ~np.isfinite(seen.points[:, :2]).all(axis=1)
         trunk = seen.points[:2, :2].mean(axis=0) - seen.points[6:8, :2].mean(axis=0)
@@ -174,15 +188,17 @@ class SimulationNode:
         self._wrench.send(Wrench(stamp_ns=now_ns, force=force, torque=torque))
 
 
-def _with_options(context: NodeContext) -> SimulationConfig:
-    """Return `[simulation]` with the options of the command line, such as `scenario=trip`, on top."""
+def _with_options(context: NodeContext) -> tuple[SimulationConfig, str]:
+    """Return `[simulation]` with the options of the command line, such as `scenario=trip`, on top, and `trace`."""
     changes: dict[str, Any] = {}
-    for name, text in context.options.items():
+    options = dict(context.options)
+    trace = options.pop("trace", "")
+    for name, text in options.items():
         if name not in SimulationConfig.model_fields:
-            raise ConfigError(f"simulation option {name}: known: {', '.join(SimulationConfig.model_fields)}")
+            raise ConfigError(f"simulation option {name}: known: trace, {', '.join(SimulationConfig.model_fields)}")
         changes[name] = text
     try:
-        return SimulationConfig.model_validate({**context.config.simulation.model_dump(), **changes})
+        return SimulationConfig.model_validate({**context.config.simulation.model_dump(), **changes}), trace
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"])) or "options"
@@ -192,6 +208,17 @@ def _with_options(context: NodeContext) -> SimulationConfig:
 def create(context: NodeContext) -> Node:
     """Return the simulation node; its options override keys of `[simulation]`."""
     return SimulationNode(context)
+
+
+def performing(performance: Performance, made: Callable[[SimulationNode], None]) -> Factory:
+    """Return what makes a node of `performance` for a campaign; `made` is called with the node."""
+
+    def factory(context: NodeContext) -> Node:
+        node = SimulationNode(context, performance)
+        made(node)
+        return node
+
+    return factory
 
 
 if __name__ == "__main__":

@@ -24,8 +24,11 @@ class SimulationConfig(Section):
     walking_speed_m_s: float = Field(default=0.6, ge=0.0, le=1.2)
     """Speed the person wants [m/s]."""
 
+    begins: Literal["at_once", "armed"] = "at_once"
+    """Whether the scenario begins with the process, or once the walker follows; the person stands until then."""
+
     event_s: float = Field(default=8.0, ge=3.0, le=3600)
-    """When the disturbance comes, after the start [s]."""
+    """When the disturbance comes, after the beginning [s]."""
 
     push_impulse_n_s: float = Field(default=60.0, ge=0, le=200)
     """Impulse of the push [N s]; 13.7 to 59.3 N s were recorded on healthy people who did not fall (human-data.csv)."""

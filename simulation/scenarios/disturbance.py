@@ -29,18 +29,43 @@ class Disturbance(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+class AtPhase:
+    """Waits with `what` for a moment of the gait: the next time, after `what.at_s`, that the stride has got so far."""
+
+    what: Disturbance
+    stride: float  # share of the stride from the touchdown of the left foot, 0..1
+    patience_s: float = 1.5  # then it happens anyway
+
+    @property
+    def at_s(self) -> float:
+        """When the waiting begins [s]."""
+        return self.what.at_s
+
+    def ready(self, world: World) -> bool:
+        """Whether the moment has come."""
+        person = world.person
+        done = 0.5 * (person.phase + (0.0 if person.stance == "l" else 1.0))
+        late = world.time_s > self.at_s + self.patience_s
+        return late or 0.0 <= done - self.stride < 0.1
+
+    def act(self, world: World, intent: Intent, since_s: float) -> Intent:
+        """Let it happen."""
+        return self.what.act(world, intent, since_s)
+
+
+@dataclass(frozen=True, slots=True)
 class Push:
     """A push at the trunk."""
 
     at_s: float
     impulse_n_s: float
-    direction_deg: float = 90.0  # in the walker's axes: 0 from behind, 90 to the left
+    direction_deg: float = 90.0  # as the person faces: 0 from behind, 90 to the left
     duration_s: float = 0.2
 
     def act(self, world: World, intent: Intent, since_s: float) -> Intent:
         """Push for as long as it lasts."""
         if since_s < self.duration_s:
-            angle = radians(self.direction_deg) + world.odometry().yaw
+            angle = radians(self.direction_deg) + world.person.heading_rad
             force = self.impulse_n_s / self.duration_s
             world.disturbing.append((world.person.torso, _force(force * cos(angle), force * sin(angle))))
         return intent
@@ -61,6 +86,25 @@ class Trip:
         if since_s < self.hold_s and person.swinging and 0.25 < person.phase < 0.8:
             foot = person.foot[person.swing]
             world.disturbing.append((foot, _force(*_braking(world, foot, self.hold_ns_m, self.hold_n))))
+        return intent
+
+
+@dataclass(frozen=True, slots=True)
+class Stumble:
+    """The swinging foot is dragged over to the other side: the legs cross and the body falls sideways."""
+
+    at_s: float
+    hold_s: float = 0.45
+    force_n: float = 150.0
+
+    def act(self, world: World, intent: Intent, since_s: float) -> Intent:
+        """Pull the swing foot towards and past the standing one."""
+        person = world.person
+        if since_s < self.hold_s and person.swinging:
+            inward = -self.force_n if person.swing == "l" else self.force_n
+            heading = person.heading_rad
+            pull = _force(-sin(heading) * inward, cos(heading) * inward)
+            world.disturbing.append((person.foot[person.swing], pull))
         return intent
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Literal
 
 from simulation.person.ability import FRAIL, Ability
 from simulation.person.anthropometry import BodySize
 from simulation.person.person import Intent
-from simulation.scenarios.disturbance import Disturbance
+from simulation.scenarios.disturbance import AtPhase, Disturbance
 from simulation.world.world import Seat, World
 
 Kind = Literal["fall", "non_fall"]
@@ -20,6 +21,22 @@ class Wish:
 
     at_s: float
     intent: Intent
+
+
+@dataclass(frozen=True, slots=True)
+class SensorFaults:
+    """What is wrong with the sensors in a scenario."""
+
+    blind_from_s: float = 0.0
+    blind_for_s: float = 0.0  # the detector finds nobody
+    force_offset_n: tuple[float, float, float] = (0.0, 0.0, 0.0)  # of the force sensor, forward, left, up
+
+    def blind(self, time_s: float) -> bool:
+        """Whether the detector finds nobody at `time_s`."""
+        return 0.0 <= time_s - self.blind_from_s < self.blind_for_s
+
+
+HEALTHY: Final = SensorFaults()
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +53,9 @@ class Scenario:
     duration_s: float = 10.0
     seat: Seat | None = None
     seed: int = 0
-    checks: tuple[str, ...] = field(default=())  # names of checks that apply, see simulation.scenarios.checks
+    faults: SensorFaults = HEALTHY
+    checks: tuple[str, ...] = ()  # names of checks that must hold, see simulation.campaign.checks
+    lowered_m: float = 0.0  # how far the person means to come down: a fall's drop counts from there
 
 
 class Performance:
@@ -46,20 +65,38 @@ class Performance:
         """Set the scene; without the harness (`worn` False) nobody helps."""
         self.scenario = scenario
         self.world = World(scenario.size, scenario.ability, seat=scenario.seat, worn=worn)
+        self.waiting = False  # while True the person stands and nothing begins
+        self._begin_s = 0.0
+        self.watchers: list[Callable[[World], None]] = []  # called after every turn
+        self._began_s: list[float | None] = [None] * len(scenario.disturbances)
 
     @property
-    def disturbed(self) -> bool:
-        """Whether anything has happened yet."""
-        return any(self.world.time_s >= each.at_s for each in self.scenario.disturbances)
+    def time_s(self) -> float:
+        """Time since the scenario began [s]."""
+        return self.world.time_s - self._begin_s
+
+    @property
+    def disturbed_s(self) -> float | None:
+        """When the first disturbance began [s]; None before it."""
+        return min((began for began in self._began_s if began is not None), default=None)
 
     def advance(self, command: tuple[float, float, float, float]) -> None:
         """Move on by one turn of the person (4 ms) with the walker's commanded velocities."""
-        now = self.world.time_s
+        if self.waiting:
+            self.world.advance(command, Intent())
+            self._begin_s = self.world.time_s
+            return
+        now = self.time_s
         intent = Intent()
         for wish in self.scenario.wishes:
             if now >= wish.at_s:
                 intent = wish.intent
-        for each in self.scenario.disturbances:
-            if now >= each.at_s:
-                intent = each.act(self.world, intent, now - each.at_s)
+        for index, each in enumerate(self.scenario.disturbances):
+            began = self._began_s[index]
+            if began is None and now >= each.at_s and (not isinstance(each, AtPhase) or each.ready(self.world)):
+                began = self._began_s[index] = now
+            if began is not None:
+                intent = each.act(self.world, intent, now - began)
         self.world.advance(command, intent)
+        for watcher in self.watchers:
+            watcher(self.world)

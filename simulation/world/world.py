@@ -19,6 +19,7 @@ from simulation.person.anthropometry import BodySize
 from simulation.person.body import PERSON, SURROUNDINGS, add_person
 from simulation.person.person import CONTROL_S, Intent, Person
 from simulation.world.harness import HarnessWrench, harness_wrench
+from simulation.world.looks import dress
 from simulation.world.parameters import HarnessParameters, WalkerParameters
 from simulation.world.walker import WALKER_CLASS, WalkerPlant, add_walker
 
@@ -86,7 +87,8 @@ class World:
             )  # fmt: skip
         add_person(spec, size)
         add_walker(spec, parameters)
-        spec.worldbody.add_light(pos=[0, -3, 5], dir=[0, 0.5, -1])
+        spec.worldbody.add_light(pos=[0, -3, 5], dir=[0, 0.5, -1], diffuse=[0.35, 0.35, 0.35])
+        dress(spec)
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         self.data.qpos[self.model.joint("column").qposadr[0]] = interface_height_m
@@ -104,6 +106,7 @@ class World:
         self._velocity = np.zeros(6)
         self.time_s = 0.0
         self.disturbing: list[tuple[int, Floats]] = []  # (body, (6,) force and torque), for the next turn only
+        self.leaning_n = 0.0  # with which the person leans on the bar in the next turn
 
     def advance(self, command: Sequence[float] | Floats, intent: Intent) -> None:
         """Move on by CONTROL_S with `command` (forward, left, yaw, column velocity) and the person wanting `intent`."""
@@ -115,10 +118,13 @@ class World:
             self.walker.apply(wanted)
             if self._worn:
                 self._couple()
+            if self.leaning_n > 0.0 and self._worn:
+                self._lean()
             for body, wrench in self.disturbing:
                 data.xfrc_applied[body] += wrench
             mujoco.mj_step(self.model, data)
         self.disturbing.clear()
+        self.leaning_n = 0.0
         self.time_s += CONTROL_S
 
     def odometry(self) -> Odometry:
@@ -203,6 +209,15 @@ class World:
             data.xfrc_applied[body] += (
                 gx, gy, gz, ry * gz - rz * gy, rz * gx - rx * gz, rx * gy - ry * gx + sign * w.yaw_nm
             )  # fmt: skip
+
+    def _lean(self) -> None:
+        """Let the arms put weight on the bar; the sensor under it feels that too."""
+        data, force = self.data, self.leaning_n
+        point = data.xpos[self._carriage]
+        for body, push in ((self._carriage, -force), (self.person.torso, force)):
+            rx, ry, _ = (point - data.xipos[body]).tolist()
+            data.xfrc_applied[body] += (0.0, 0.0, push, ry * push, -rx * push, 0.0)
+        self.wrench = self.wrench._replace(up_n=self.wrench.up_n - force)
 
     def _velocities(self) -> None:
         """Find the pelvis' velocity relative to the interface (vx, vy, vz, yaw rate) in world axes."""

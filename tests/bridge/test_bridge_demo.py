@@ -7,7 +7,7 @@ import pytest
 from demo_stream import run
 
 from bridge.config.load import load_config
-from bridge.launch import demo
+from bridge.launch import rehearse as demo
 from bridge.launch.summary import fall_of, summarise
 from bridge.launch.timeline import Recorder
 
@@ -21,7 +21,7 @@ def test_the_recording_is_found_and_has_a_fall():
 
 
 def test_the_demo_is_on_a_wire_of_its_own():
-    loaded = load_config(None, demo._private_wire(None, []))
+    loaded = load_config(None, demo.private_wire(None, []))
     assert loaded.bridge.namespace != load_config(None).bridge.namespace
     assert set(loaded.launch.roles) == {"perception", "anticipation", "controller", "drive"}
     assert not loaded.launch.restart
@@ -33,7 +33,7 @@ def test_a_port_in_use_is_not_used():
         busy.listen()
         taken = f"tcp/127.0.0.1:{busy.getsockname()[1]}"
         overrides = [f"bridge.endpoints.controller={taken}"]
-        loaded = load_config(None, [*overrides, *demo._private_wire(None, overrides)])
+        loaded = load_config(None, [*overrides, *demo.private_wire(None, overrides)])
     assert loaded.bridge.endpoints["controller"] != taken
     assert len(set(loaded.bridge.endpoints.values())) == 4
 

@@ -1,4 +1,4 @@
-"""`surefoot demo` with real processes: toy nodes on the real wire."""
+"""`surefoot rehearse` with real processes: toy nodes on the real wire."""
 
 from __future__ import annotations
 
@@ -20,7 +20,17 @@ def stage(tmp_path: Path) -> Stage:
 
 
 def start(stage: Stage, *arguments: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "bridge.cli", "demo", "--config", str(stage.config), "--out", "out", *arguments]
+    command = [
+        sys.executable,
+        "-m",
+        "bridge.cli",
+        "rehearse",
+        "--config",
+        str(stage.config),
+        "--out",
+        "out",
+        *arguments,
+    ]
     return subprocess.Popen(
         command, env=stage.environment(), cwd=stage.folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )

@@ -1,4 +1,4 @@
-"""`surefoot demo`: the real processes on the recording that ships, with a timeline and a picture of what they did."""
+"""`surefoot rehearse`: the real processes on the recording that ships, with a timeline and a picture of it."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ from bridge.transport.zenoh import ZenohTransport
 CLIP: Final = "walk-stumble-fall"
 ROLES: Final = ("perception", "anticipation", "controller", "drive")
 TABLE_PERIOD_S: Final = 0.02  # of the columns in file and picture
-TIME_LIMIT_S: Final = 55.0  # the demo never takes longer, whatever happens
+TIME_LIMIT_S: Final = 55.0  # it never takes longer, whatever happens
 
 
-def demo(
+def rehearse(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where timeline.png and timeline.csv go.")] = Path(
-        "runs/demo"
+        "runs/rehearse"
     ),
     config: Annotated[Path | None, typer.Option(metavar="FILE", help="Configuration; default: the defaults.")] = None,
     set_: Annotated[
@@ -52,13 +52,13 @@ def demo(
     timeline.png and timeline.csv. Ends by itself. Exit code 2: a process refused to start or died.
     """
     recording = _recording()
-    overrides = [*(set_ or []), *_private_wire(config, set_ or [])]
+    overrides = [*(set_ or []), *private_wire(config, set_ or [])]
     loaded = load_config(config, overrides)
     options: dict[str, dict[str, str]] = {"perception": {"source": f"{recording}:{CLIP}"}}
     if controller is not None:
         options["controller"] = {"controller": controller.value}
     console = Console(highlight=False, soft_wrap=True)
-    console.print(f"[bold]surefoot demo[/]  {CLIP}: a generated recording, through the real processes over Zenoh")
+    console.print(f"[bold]surefoot rehearse[/]  {CLIP}: a generated recording, through the real processes over Zenoh")
     recorder = Recorder()
     transport = ZenohTransport(loaded.bridge, "observer", SystemClock())
     try:
@@ -69,7 +69,7 @@ def demo(
         transport.close()
     rows = recorder.rows(TABLE_PERIOD_S)
     if not rows:
-        raise SurefootError(f"demo: ended before any keypoints came; see {out / 'logs'}")
+        raise SurefootError(f"rehearse: ended before any keypoints came; see {out / 'logs'}")
     labels = _labels(recording)
     summary = summarise(rows, *(fall_of(labels.label, labels.time_s)))
     _write(out, loaded, recorder, rows, labels, summary)
@@ -108,8 +108,8 @@ def _labels(recording: Path) -> Labels:
     return Labels(np.arange(len(label)) / fps, label)
 
 
-def _private_wire(config: Path | None, overrides: Sequence[str]) -> list[str]:
-    """Return overrides that keep the demo off a wire in use: its own namespace, and free ports where some are taken."""
+def private_wire(config: Path | None, overrides: Sequence[str]) -> list[str]:
+    """Return overrides that keep a run off a wire in use: its own namespace, and free ports where some are taken."""
     endpoints = load_config(config, overrides).bridge.endpoints
     private = [f'bridge.namespace="demo-{os.getpid()}"', "launch.restart=false", f"launch.roles={list(ROLES)}"]
     for role in ROLES:

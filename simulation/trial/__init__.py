@@ -1,0 +1,1 @@
+"""One trial with and without help: traces, film, figure, and `surefoot demo`."""

@@ -1,0 +1,187 @@
+"""`surefoot demo`: a person walks, is pushed, and is held; then the same push without help."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Final, NamedTuple
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from bridge.clock import NS, SystemClock
+from bridge.config.load import load_config
+from bridge.config.surefoot import SurefootConfig
+from bridge.errors import SurefootError
+from bridge.launch.launcher import Launcher, Phase, ProcessState
+from bridge.launch.monitor import View
+from bridge.launch.observer import Enough, Observer
+from bridge.launch.rehearse import private_wire
+from bridge.launch.timeline import Recorder, Row
+from bridge.launch.watch import Limits, watch_over
+from bridge.transport.zenoh import ZenohTransport
+from simulation.trial.figure import Told, draw
+from simulation.trial.outcome import DROP_LIMIT_M, Outcome, outcome_of
+from simulation.trial.trace import Trace, load_trace
+
+WORLD: Final = ('launch.modules.drive="simulation.node"', 'simulation.begins="armed"')
+TIME_LIMIT_S: Final = 40.0  # no trial takes longer, whatever happens
+FILM_LIMIT_S: Final = 120.0
+WITHOUT_HELP: Final = ("intervention.steps_used=0",)
+
+
+class _UntilOver(Observer):
+    """Watches until the world's process has come to the end of the trial."""
+
+    def show(self, elapsed_s: float, processes: Mapping[str, ProcessState], view: View) -> None:
+        """Print what is due."""
+        super().show(elapsed_s, processes, view)
+        if processes["drive"].phase is Phase.FINISHED:
+            raise Enough
+
+
+class Trial(NamedTuple):
+    """One run of the four processes."""
+
+    trace: Trace
+    rows: list[Row]
+    event_s: float  # when it happened, in the rows' time [s]
+    outcome: Outcome
+    reason: str  # of the first ARREST
+
+
+def demo(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where film, pictures and recordings go.")] = Path(
+        "runs/demo"
+    ),
+    config: Annotated[Path | None, typer.Option(metavar="FILE", help="Configuration; default: the defaults.")] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Override a value; repeatable.")
+    ] = None,
+    film: Annotated[bool, typer.Option(help="Render demo.gif and demo.png.")] = True,
+) -> int:
+    """Run the real processes with a simulated person, twice: with Surefoot, and with its intervention switched off.
+
+    Perception, anticipation, controller and a MuJoCo world talk over Zenoh in real time. Writes demo.gif and demo.png
+    (rendered off screen), timeline.png, an MCAP recording and a trace of each trial, and prints both outcomes.
+
+    Example: surefoot demo --set simulation.scenario=trip --set simulation.person_mass_kg=100
+    """
+    console = Console(highlight=False, soft_wrap=True)
+    overrides = [*(set_ or []), *private_wire(config, set_ or []), *WORLD]
+    settings = load_config(config, overrides).simulation
+    console.print(
+        f"[bold]surefoot demo[/]  {settings.person_height_m:.2f} m, {settings.person_mass_kg:.0f} kg, walking at"
+        f" {settings.walking_speed_m_s:.1f} m/s; {settings.scenario} at {settings.event_s:.0f} s;"
+        " four processes over Zenoh, in real time"
+    )
+    out.mkdir(parents=True, exist_ok=True)
+    console.print("\n[bold]1. with Surefoot[/]")
+    held = _run("held", out, config, overrides, settings.event_s, console)
+    console.print("\n[bold]2. the same without intervention[/]")
+    unheld = _run("unheld", out, config, [*overrides, *WITHOUT_HELP], settings.event_s, console)
+    told = [
+        Told(name, trial.trace, settings.event_s, trial.rows, trial.event_s)
+        for name, trial in (("with Surefoot", held), ("without intervention", unheld))
+    ]
+    draw(told, out / "timeline.png")
+    made = ["timeline.png", "held.mcap", "unheld.mcap"]
+    if film and _film(out, config, overrides, settings.event_s, console):
+        made = ["demo.gif", "demo.png", *made]
+    console.print()
+    console.print(_side_by_side(held, unheld))
+    console.print(f"in [bold]{out}[/]: {', '.join(made)}")
+    return 0
+
+
+def _run(
+    name: str, out: Path, config: Path | None, overrides: Sequence[str], event_s: float, console: Console
+) -> Trial:
+    """Run one trial and return what became of it."""
+    loaded = load_config(config, overrides)
+    trace = out / f"{name}.npz"
+    trace.unlink(missing_ok=True)
+    options = {"perception": {"source": "wire"}, "drive": {"trace": str(trace)}}
+    recorder = Recorder()
+    transport = ZenohTransport(loaded.bridge, "observer", SystemClock())
+    try:
+        observer = _UntilOver(console, recorder, transport, None)
+        with (
+            _recording(out / f"{name}.mcap", config, overrides),
+            Launcher(loaded, config, overrides, options, out / "logs" / name) as launcher,
+        ):
+            _watch(launcher, loaded, observer)
+    finally:
+        transport.close()
+    rows = recorder.rows(0.02)
+    if not rows or not trace.is_file():
+        raise SurefootError(f"demo: the trial ended before anything happened; see {out / 'logs' / name}")
+    told = load_trace(trace)
+    happened_ns = float(np.interp(event_s, told.time_s, told.stamp_ns))
+    happened_s = (happened_ns - (recorder.origin_ns or 0)) / NS
+    arrest = next((row.reason for row in rows if row.state == "ARREST"), "")
+    return Trial(told, rows, happened_s, outcome_of(told, event_s), arrest)
+
+
+def _watch(launcher: Launcher, config: SurefootConfig, observer: Observer) -> None:
+    try:
+        given_up = watch_over(launcher, config, observer, Limits(duration_s=TIME_LIMIT_S))
+    except Enough:
+        return
+    for process in given_up:
+        raise SurefootError(f"{process.role} died with exit code {process.exit_code}: {process.last_line}")
+
+
+@contextmanager
+def _recording(path: Path, config: Path | None, overrides: Sequence[str]) -> Iterator[None]:
+    """Record the wire into `path` meanwhile, in a process of its own."""
+    words = ["record", "--out", str(path), "--overwrite"]
+    words += ["--config", str(config)] if config is not None else []
+    words += [word for override in overrides for word in ("--set", override)]
+    process = subprocess.Popen(  # noqa: S603 (our own command)
+        [sys.executable, "-m", "bridge.cli", *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    try:
+        yield
+    finally:
+        process.terminate()
+        process.wait(timeout=20)
+
+
+def _film(out: Path, config: Path | None, overrides: Sequence[str], event_s: float, console: Console) -> bool:
+    """Render the film in a process of its own; return whether there is one now."""
+    del config  # the overrides name everything of [simulation] that a film needs
+    words = [str(out / "held.npz"), str(out / "unheld.npz"), str(out), "--event-s", str(event_s)]
+    words += [word for override in overrides for word in ("--set", override)]
+    try:
+        done = subprocess.run(  # noqa: S603 (our own module)
+            [sys.executable, "-m", "simulation.trial.film", *words],
+            capture_output=True, text=True, timeout=FILM_LIMIT_S, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        console.print(f"no film: rendering took longer than {FILM_LIMIT_S:.0f} s")
+        return False
+    if done.returncode != 0:
+        console.print((done.stderr.strip().splitlines() or ["no film: rendering failed"])[-1])
+        return False
+    return True
+
+
+def _side_by_side(held: Trial, unheld: Trial) -> Table:
+    table = Table("", "with Surefoot", "without")
+    lines: tuple[tuple[str, Callable[[Outcome], str]], ...] = (
+        ("outcome", lambda o: "held" if o.held else "fell"),
+        (f"pelvis drop in m, limit {DROP_LIMIT_M:.2f}", lambda o: f"{o.drop_m:.2f}"),
+        ("peak force at the harness in N", lambda o: f"{o.peak_force_n:.0f}"),
+        ("knees or trunk on the floor", lambda o: "yes" if o.touched else "no"),
+        ("walker tipped", lambda o: "yes" if o.tipped else "no"),
+    )
+    for name, of in lines:
+        table.add_row(name, of(held.outcome), of(unheld.outcome))
+    table.add_row("why it arrested", held.reason or "-", unheld.reason or "-")
+    return table
