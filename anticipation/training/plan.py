@@ -95,7 +95,8 @@ FULL: Final = {
 
 def _small(plan: Plan, rate: float) -> Plan:
     """Return the plan with fits that show that everything runs, and no more."""
-    light = Recipe(epochs=2, draws=128, batch=64)
+    slow = plan.forecaster == "lstm"
+    light = Recipe(epochs=1, draws=64, batch=32) if slow else Recipe(epochs=2, draws=128, batch=64)
     return replace(
         plan,
         mocap_clips=8,

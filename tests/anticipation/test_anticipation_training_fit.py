@@ -11,13 +11,14 @@ from typer.testing import CliRunner
 
 from anticipation import checkpoint
 from anticipation.gait_state import DirectedGraphNetwork
-from anticipation.motion import HORIZON, WINDOW, DctMlpForecaster, zero_velocity
+from anticipation.motion import HORIZON, WINDOW, DctMlpForecaster, LstmForecaster, zero_velocity
 from anticipation.training import fitting
 from anticipation.training.augmentation import augment
 from anticipation.training.clips import Clip
 from anticipation.training.commands import train
 from anticipation.training.evaluation.command import evaluate
 from anticipation.training.measures import calibration_error, temperatures
+from anticipation.training.plan import RecipeName, plan_for
 from anticipation.training.samples import clean, cut
 from bridge.config.perception import CleaningConfig
 from bridge.errors import SurefootError
@@ -116,6 +117,31 @@ def test_train_writes_a_checkpoint_that_loads(made_data, tmp_path):
     loaded = checkpoint.load(out)
     assert "non-commercial" in loaded.provenance.licence
     assert (loaded.temperature > 0).all()
+
+
+def test_the_paper_s_recipe_makes_the_paper_s_networks(made_data, tmp_path):
+    """LSTM of Table 1 rolled forward, DGNN on coordinates alone, and nothing that the paper does not have."""
+    measured = tmp_path / "measured.json"
+    measured.write_text(json.dumps({"protocol": "none", "temperature": [1.0] * (HORIZON + 1)}))
+    out = tmp_path / "weights.safetensors"
+    options = ["train", "--data", str(made_data), "--quick", "--recipe", "paper", "--evaluation", str(measured)]
+    result = CliRunner().invoke(commands(), [*options, "--no-log", "--out", str(out)], catch_exceptions=False)
+    assert result.exit_code == 0
+    made = checkpoint.load(out)
+    assert isinstance(made.forecaster, LstmForecaster)
+    assert made.forecaster.settings == LstmForecaster("rollout", 512, 2, 0.5, residual=False).settings
+    assert made.classifier.settings["widths"] == [16, 32, 64]
+    assert not made.classifier.centre
+    assert made.outlook is None
+    assert not made.mirrored
+
+
+@pytest.mark.parametrize("recipe", RecipeName)
+def test_every_recipe_keeps_the_seed_in_every_fit(recipe):
+    plan = plan_for(recipe, 7, quick=False)
+    fits = [plan.pretrain, plan.finetune, plan.classifier, plan.baseline, plan.outlook]
+    assert {fit.seed for fit in fits if fit is not None} == {7}
+    assert plan_for(recipe, 7, quick=False, epochs=3).classifier.epochs == 3
 
 
 @pytest.mark.parametrize("command", [train, evaluate])
