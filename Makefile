@@ -6,13 +6,22 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
-.PHONY: demo test lint format bench faults fuzz soak clean
+.PHONY: demo test lint format bench properties mutate faults fuzz soak clean
 
 demo: $(VENV)/.base
 	$(BIN)/surefoot demo
 
 test: $(VENV)/.dev
 	$(BIN)/python -m pytest
+
+# The property tests of the controller with a hundred times as many examples: about ten minutes.
+properties: $(VENV)/.dev
+	SUREFOOT_EXAMPLES=100 $(BIN)/python -m pytest tests/controller/test_controller_properties.py --timeout=3600 \
+	  --hypothesis-show-statistics
+
+# Changes the safety gate in every way and asks its tests whether they notice: about ten minutes.
+mutate: $(VENV)/.mutate
+	$(BIN)/python tests/controller/mutate_gate.py
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -28,6 +37,7 @@ bench: $(VENV)/.bench
 	$(BIN)/python -m benchmarks.anticipation --json runs/bench/anticipation.json
 	$(BIN)/python -m benchmarks.wire --json runs/bench/wire.json
 	$(BIN)/surefoot latency --json runs/bench/latency.json
+	$(BIN)/python -m benchmarks.loop --json runs/bench/loop.json
 
 # Real processes, faults x streams: about six minutes on an idle machine; writes the table of docs/safety.md.
 faults: $(VENV)/.dev
@@ -63,6 +73,11 @@ $(VENV)/.base: pyproject.toml constraints.txt
 $(VENV)/.dev: $(VENV)/.base
 	@echo "installing what tests and lint need"
 	@$(PIP) install --quiet -c constraints.txt -e '.[dev]'
+	@touch $@
+
+$(VENV)/.mutate: $(VENV)/.dev
+	@echo "installing what mutates and what counts covered branches"
+	@$(PIP) install --quiet -c constraints.txt -e '.[dev,mutate]'
 	@touch $@
 
 $(VENV)/.bench: $(VENV)/.dev

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -137,6 +138,8 @@ class TestRefusing:
         assert out.reason == "no command received yet"
         assert out.stamp_ns == NS
         assert gate.refused == 1
+        gate.filter(None, NS)
+        assert gate.refused == 2
 
     @pytest.mark.parametrize("axis", range(4))
     @pytest.mark.parametrize("sign", [-1.0, 1.0])
@@ -183,7 +186,12 @@ class TestTime:
         assert make_gate().filter(command(NS + 50 * MS), NS).valid
         out = make_gate().filter(command(NS + 51 * MS), NS)
         assert out.reason == "command is stamped 51 ms ahead, limit 50"
-        assert not make_gate().filter(command(NS + 50 * MS + 1000), NS).valid
+        assert not make_gate().filter(command(NS + 50 * MS + 1), NS).valid
+
+    def test_limits_are_said_in_milliseconds(self) -> None:
+        gate = SafetyGate(replace(LIMITS, lifetime_s=0.9, future_tolerance_s=0.9), column_height_m=1.0)
+        assert gate.filter(command(lifetime_s=0.9), NS + 901 * MS).reason.endswith("limit 900")
+        assert gate.filter(command(NS + 901 * MS), NS).reason.endswith("limit 900")
 
     def test_same_command_may_be_given_until_it_expires(self) -> None:
         gate, asked = make_gate(), command(sequence=4)

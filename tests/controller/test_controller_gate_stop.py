@@ -65,6 +65,7 @@ class TestStopping:
         assert (out.rests_on_ns, out.fall_distance, out.fall_probability) == (77, 1.5, 0.25)
         assert abs(out.velocity[0]) < 0.8
         assert gate.refused == refused
+        assert out.stamp_ns == now_ns
         assert (tuple(out.damping), tuple(out.stiffness)) == HELD
 
     def test_gate_that_was_not_told_what_a_stop_holds_with_says_nothing(self) -> None:
@@ -231,6 +232,14 @@ class TestFollowing:
     def test_slope_beyond_the_acceleration_limit_is_not_believed(self, slope: float) -> None:
         _, a = follow_velocity(0.0, math.copysign(2.0, slope), 0.0, slope, 0.01, self.LIMITS)
         assert abs(a) <= 2.0
+
+    @pytest.mark.parametrize("sign", [-1.0, 1.0])
+    def test_a_command_that_rises_into_the_velocity_limit_can_still_be_turned_round(self, sign: float) -> None:
+        """Whatever slope is believed: winding the acceleration down at J always ends within V."""
+        v, a = sign * 0.9, sign * 2.0
+        for _ in range(8):
+            v, a = follow_velocity(v, a, sign * 1.0, sign * 2.0, 0.01, self.LIMITS)
+            assert abs(v) + a * a / (2 * 40.0) <= 1.0 + 1e-9
 
     def test_stopping_speed_stops_within_the_room(self) -> None:
         A, J = 2.0, 160.0
