@@ -70,7 +70,7 @@ class Bench:
         config_path: Path | None = None,
     ) -> None:
         self.clock = ManualClock(NS)
-        hub = MemoryHub(self.clock)
+        hub = self.hub = MemoryHub(self.clock)
         wire = hub.transport()
         self.controller: Any = make(self.clock)
         context = NodeContext(
@@ -273,6 +273,23 @@ class TestStatus:
 
     def test_is_never_finished(self) -> None:
         assert not Bench().node.finished()
+
+
+class TestRival:
+    def test_a_second_publisher_is_named_and_changes_nothing(self) -> None:
+        bench = Bench()
+        bench.run(1.0)
+        before = bench.sent[-1].state
+        other = Outbox(bench.hub.transport(), WRENCH)
+        for _ in range(50):
+            other.send(wrench(bench.clock.now_ns(), force=(0.0, 0.0, -900.0)))  # a fall, if it were believed
+            bench.run(0.01)
+        assert before is bench.sent[-1].state is GaitState.FOLLOW
+        status = bench.node.status(bench.clock.now_ns())
+        assert status.level == 1
+        assert "two publishers of wrench: the first is followed, the other refused" in status.summary
+        bench.run(1.2)
+        assert "two publishers" not in bench.node.status(bench.clock.now_ns()).summary
 
 
 class TestReload:
