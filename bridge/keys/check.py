@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ipaddress
+import re
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -21,6 +23,7 @@ from bridge.keys.files import (
     require_private,
 )
 
+_HOST = re.compile(r"^(?!-)[A-Za-z0-9-]{1,63}(?<!-)(\.(?!-)[A-Za-z0-9-]{1,63}(?<!-))*$")
 SOON: Final = timedelta(days=30)  # what expires sooner is named
 
 
@@ -87,6 +90,19 @@ def hosts(certificate: x509.Certificate) -> tuple[str, ...]:
         *names.get_values_for_type(x509.DNSName),
         *(str(address) for address in names.get_values_for_type(x509.IPAddress)),
     )
+
+
+def require_host(name: str) -> None:
+    """Raise unless `name` can be dialled: an IP address, or a host name (RFC 1123).
+
+    Raises:
+        KeysError: it is neither.
+    """
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        if len(name) > 253 or not _HOST.match(name):
+            raise KeysError(f"--host {name}: neither an address nor a host name, without port or protocol") from None
 
 
 def remaining(certificate: x509.Certificate, now: datetime) -> str:

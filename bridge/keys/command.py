@@ -11,7 +11,7 @@ import typer
 
 from bridge.config.load import load_config
 from bridge.keys.authority import Pair, create_authority, issue
-from bridge.keys.check import load_credentials, remaining
+from bridge.keys.check import load_credentials, remaining, require_host
 from bridge.keys.files import (
     AUTHORITY,
     KeysError,
@@ -77,7 +77,9 @@ def issue_(
     renew: Annotated[bool, typer.Option("--renew", help="Replace what these roles have.")] = False,
 ) -> None:
     """Make a key and a certificate for each ROLE, signed by the authority."""
-    wanted = _known(roles or list(IDENTITIES))
+    wanted, names = _known(roles or list(IDENTITIES)), host or []
+    for name in names:
+        require_host(name)
     authority = Pair(read_key(key_file(folder, AUTHORITY)), read_certificates(certificate_file(folder, AUTHORITY))[0])
     expired = remaining(authority.certificate, datetime.now(UTC))
     if expired.startswith("expired"):
@@ -88,7 +90,7 @@ def issue_(
         write(certificate_file(out, AUTHORITY), certificate_file(folder, AUTHORITY).read_bytes(), 0o644, replace=True)
         write(out / CONFIG, _CONFIG_TEXT.format(folder=json.dumps(FOLDER.name)).encode(), 0o644, replace=True)
     for role in wanted:
-        write_pair(target, role, issue(authority, role, host or [], days), replace=renew)
+        write_pair(target, role, issue(authority, role, names, days), replace=renew)
         until = load_credentials(target, role).expires
         typer.echo(f"{certificate_file(target, role)}: until {until:%Y-%m-%d}", err=True)
 

@@ -73,7 +73,8 @@ def write_pair(folder: Path, identity: str, pair: Pair, *, replace: bool = False
     if not replace:
         for path in (key, certificate):
             if path.exists() or path.is_symlink():
-                raise KeysError(f"{path}: is there already; surefoot keys issue --renew replaces a role's")
+                how = "a new authority needs a new folder" if identity == AUTHORITY else "--renew replaces it"
+                raise KeysError(f"{path}: is there already; {how}")
     write(key, pair.key_pem(), 0o600, replace=replace)
     write(certificate, pair.certificate_pem(), 0o644, replace=replace)
 

@@ -3,7 +3,8 @@
 Zenoh writes its log to the process's standard output and tells of denied messages only on its most
 talkative level, a line for each message, denied or not. So its output goes to a file in memory, which
 never blocks and costs the writer a few microseconds, and a thread reads and empties it four times a second. Node
-processes print nothing themselves; their Python's `sys.stdout` still leads where it led.
+processes print nothing themselves; their Python's `sys.stdout` still leads where it led. Where RUST_LOG is set,
+somebody wants to read Zenoh's own log: it goes where it always goes, and nothing is picked from it.
 """
 
 from __future__ import annotations
@@ -108,6 +109,10 @@ class WireLog:
             self._links = None if session is None else LinkWatch(session, self._log)
 
     def __enter__(self) -> Self:
+        if "RUST_LOG" in os.environ:
+            zenoh.try_init_log_from_env()
+            self._thread.start()
+            return self
         self._memory = os.memfd_create("zenoh-log")
         writer = os.open(f"/proc/self/fd/{self._memory}", os.O_WRONLY | os.O_APPEND)  # after a cut, go on at the start
         sys.stdout.flush()
@@ -121,9 +126,10 @@ class WireLog:
     def __exit__(self, *error: object) -> None:
         self._stop.set()
         self._thread.join()
-        sys.stdout.flush()
-        os.dup2(sys.stdout.fileno(), 1)
-        os.close(self._memory)
+        if self._memory >= 0:
+            sys.stdout.flush()
+            os.dup2(sys.stdout.fileno(), 1)
+            os.close(self._memory)
 
     def _run(self) -> None:
         turn = 0
@@ -138,7 +144,7 @@ class WireLog:
                     self._links.look()
 
     def _sweep(self) -> None:
-        text = os.pread(self._memory, _READ_BYTES, 0)
+        text = os.pread(self._memory, _READ_BYTES, 0) if self._memory >= 0 else b""
         if text:
             os.ftruncate(self._memory, 0)
             self._digest.take(text, time.monotonic())

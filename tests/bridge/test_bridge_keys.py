@@ -165,6 +165,14 @@ def test_a_misspelt_role_is_named(made: Path, capsys: pytest.CaptureFixture[str]
     assert "perceptoin: no such role; known: " in error
 
 
+@pytest.mark.parametrize("host", ["tls/10.0.0.2:7470", "10.0.0.2:7470", "a b", "", "-a", "kamera-ä", "a" * 300])
+def test_a_host_that_cannot_be_dialled_is_named(made: Path, host: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, error = run(capsys, "keys", "issue", "drive", "--keys", made, "--host", host, "--renew")
+    assert code == 2
+    assert "neither an address nor a host name" in error
+    assert "10.0.0.3" in load_credentials(made, "drive").hosts, "and what was there is still there"
+
+
 def replaced(name: str, content: bytes) -> Callable[[Path], None]:
     return lambda folder: (folder / name).write_bytes(content) and None
 
