@@ -52,6 +52,9 @@ COMMANDS: Final = {
     "evaluate": Command(
         "anticipation.training.evaluation.command:evaluate", "Measure the anticipation, split by sequence."
     ),
+    "campaign": Command(
+        "simulation.campaign.command:campaign", "Hundreds of simulated falls: no help, reactive, anticipatory."
+    ),
 }
 
 _usage_error = typer.BadParameter.__base__  # typer names only this one of its usage errors

@@ -1,0 +1,1 @@
+"""Hundreds of scenarios through the whole stack: no intervention, reactive, anticipatory."""
