@@ -1,6 +1,6 @@
-"""The classifier as a running node uses it: one sequence at a time, the same numbers with less work.
+"""The classifier as a running node uses it: one or two sequences at a time, the same numbers with less work.
 
-At batch size one the arithmetic is small and the calls are many, so batch norms are folded into the layers before
+At such batch sizes the arithmetic is small and the calls are many, so batch norms are folded into the layers before
 them, shortcut and convolution are one product, and vertices and edges share it. A test holds the numbers equal to
 those of the module.
 """
@@ -16,18 +16,18 @@ from anticipation.gait_state import ChannelNorm, DirectedGraphBlock, DirectedGra
 
 
 class Judgement(NamedTuple):
-    """The classifier's view of every window of a sequence of T frames."""
+    """The classifier's view of every window of sequences of T frames."""
 
-    embedding: Tensor  # (T - 14, 128)
-    logits: Tensor  # (T - 14, 3)
+    embedding: Tensor  # (B, T - 14, 128)
+    logits: Tensor  # (B, T - 14, 3)
 
 
 class FastDirectedGraph:
-    """`DirectedGraphNetwork` in evaluation mode for one sequence: (1, T, 13, 2) -> `Judgement`.
+    """`DirectedGraphNetwork` in evaluation mode for few sequences: (B, T, 13, 2) -> `Judgement`.
 
     It keeps copies of the weights: later training does not reach it.
 
-    Vertices and edges, twelve of each, are the two entries of the first axis of X (2, 12, T, C).
+    Vertices and edges, twelve of each, are the two entries of the first axis of X (2, 12, B, T, C).
     """
 
     def __init__(self, network: DirectedGraphNetwork) -> None:
@@ -36,24 +36,25 @@ class FastDirectedGraph:
             self._entering = network.entering
             self._bones = (target - source).T.contiguous()  # (E, V)
             norms = [_affine(norm) for norm in (network.vertex_norm, network.edge_norm)]
-            self._scale = torch.stack([scale for scale, _ in norms])[:, None, None]  # (2, 1, 1, C)
-            self._shift = torch.stack([shift for _, shift in norms])[:, None, None]
+            self._scale = torch.stack([scale for scale, _ in norms])[:, None, None, None]  # (2, 1, 1, 1, C)
+            self._shift = torch.stack([shift for _, shift in norms])[:, None, None, None]
             self._blocks = [_FastBlock(cast(DirectedGraphBlock, block)) for block in network.blocks]
             self._bias, self._head = network.head.bias.clone(), network.head.weight.T.contiguous()
 
     def __call__(self, frames: Tensor) -> Judgement:
-        """Judge every window of frames (1, T, 13, 2)."""
-        vertices = self._entering(frames)[0].transpose(0, 1).contiguous()  # (12, T, C)
+        """Judge every window of frames (B, T, 13, 2)."""
+        vertices = self._entering(frames).permute(2, 0, 1, 3).contiguous()  # (12, B, T, C)
         edges = (self._bones @ vertices.flatten(1)).view_as(vertices)
         X = torch.addcmul(self._shift, torch.stack((vertices, edges)), self._scale)
         for block in self._blocks:
             X = block(X)
-        embedding = X.mean(dim=1).transpose(0, 1).flatten(1)  # (T - 14, 2 x 64)
-        return Judgement(embedding, torch.addmm(self._bias, embedding, self._head))
+        embedding = X.mean(dim=1).permute(1, 2, 0, 3).flatten(2)  # (B, T - 14, 2 x 64)
+        logits = torch.addmm(self._bias, embedding.flatten(0, 1), self._head)
+        return Judgement(embedding, logits.view(*embedding.shape[:2], -1))
 
 
 class _FastBlock:
-    """`DirectedGraphBlock` for X (2, 12, T, C_in) -> (2, 12, T - kernel + 1, C_out)."""
+    """`DirectedGraphBlock` for X (2, 12, B, T, C_in) -> (2, 12, B, T - kernel + 1, C_out)."""
 
     def __init__(self, block: DirectedGraphBlock) -> None:
         source, target = block.graph.matrices()
@@ -69,22 +70,22 @@ class _FastBlock:
 
     def __call__(self, X: Tensor) -> Tensor:
         vertices, edges = X.unbind()
-        _, nodes, T, _ = X.shape
-        Y = X.new_empty(2, nodes, T, self._width)
+        _, nodes, B, T, _ = X.shape
+        Y = X.new_empty(2, nodes, B, T, self._width)
         self._mix(self._at_vertices, edges, vertices, self._vertex, self._vertex_bias, Y[0])
         self._mix(self._at_edges, Y[0], edges, self._edge, self._edge_bias, Y[1])
         # kernel successive frames of C channels lie one behind the other in memory: windows are a view
         steps, reach = T - self._kernel + 1, self._kernel * self._width
-        windows = Y.as_strided((2, nodes, steps, reach), (*Y.stride()[:3], 1))
-        columns = torch.cat((windows, X[:, :, self._kernel - 1 :]), dim=-1).flatten(1, 2)
+        windows = Y.as_strided((2, nodes, B, steps, reach), (*Y.stride()[:4], 1))
+        columns = torch.cat((windows, X[:, :, :, self._kernel - 1 :]), dim=-1).flatten(1, 3)
         Z = torch.baddbmm(self._time_bias, columns, self._time).relu_()
-        return Z.view(2, nodes, steps, self._width)
+        return Z.view(2, nodes, B, steps, self._width)
 
     @staticmethod
     def _mix(graph: Tensor, neighbours: Tensor, own: Tensor, weight: Tensor, bias: Tensor, out: Tensor) -> None:
-        """One layer on [own, first neighbours, second neighbours], written to `out` (12, T, C_out)."""
+        """One layer on [own, first neighbours, second neighbours], written to `out` (12, B, T, C_out)."""
         first, second = (graph @ neighbours.flatten(1)).view(2, *neighbours.shape).unbind()
-        entered = torch.cat((own, first, second), dim=-1).flatten(0, 1)
+        entered = torch.cat((own, first, second), dim=-1).flatten(0, 2)
         torch.addmm(bias, entered, weight, out=out.view(-1, out.shape[-1])).relu_()
 
 

@@ -43,9 +43,8 @@ class Predictor:
         self._forecast = fast_forecast(checkpoint.forecast if own else BASELINES[config.forecaster])
         self._classify = FastDirectedGraph(checkpoint.classifier)
         self._outlook = None if checkpoint.outlook is None else FastOutlook(checkpoint.outlook)
-        self._mirrored = checkpoint.mirrored
         self._window = PoseWindow(config, checkpoint.statistics.mean_pose)
-        self._frames = torch.zeros(1, WINDOW + HORIZON, ROWS, 2)
+        self._frames = torch.zeros(1 + checkpoint.mirrored, WINDOW + HORIZON, ROWS, 2)
 
     @classmethod
     def from_config(cls, config: AnticipationConfig) -> Self:
@@ -108,24 +107,25 @@ class Predictor:
     def _run(self, window: NDArray[np.float32]) -> tuple[Floats, Floats, Floats]:
         """Return 30 frames (30, 13, 2), logits (16, 3) and the plane's features (16, D) of a window (15, 13, 2)."""
         with torch.inference_mode():
-            self._frames[0, :WINDOW] = torch.from_numpy(window)
-            self._frames[:, WINDOW:] = self._forecast(self._frames[:, :WINDOW])
-            judgement = self._classify(self._frames)
-            logits, sides = judgement.logits, self._frames[:, :WINDOW]
-            if self._mirrored:  # the networks were not made symmetric; the mean with the mirror image is, and errs less
-                reflected = mirrored(sides)
-                reflection = self._classify(torch.cat((reflected, self._forecast(reflected)), dim=1))
-                logits, sides = 0.5 * (logits + reflection.logits), torch.cat((sides, reflected))
+            frames = self._frames  # (1 or 2, 30, 13, 2)
+            frames[0, :WINDOW] = torch.from_numpy(window)
+            if (
+                len(frames) > 1
+            ):  # the networks were not made symmetric; the mean with the mirror image is, and errs less
+                frames[1, :WINDOW] = mirrored(frames[0, :WINDOW])
+            for side in frames.split(1):
+                side[:, WINDOW:] = self._forecast(side[:, :WINDOW])
+            judgement = self._classify(frames)
+            logits = judgement.logits.mean(dim=0)
             if self._outlook is not None:
-                logits = 0.5 * (logits + self._outlook(sides).mean(dim=0))
+                logits = 0.5 * (logits + self._outlook(frames[:, :WINDOW]).mean(dim=0))
             if self._plane.features == "embedding":
-                features = judgement.embedding
+                features = judgement.embedding[0]
             else:  # every window is a stretch of the flattened frames
-                plain = self._plane.features == "window"
-                poses = self._frames[0, :, :KEYPOINTS]
-                poses = poses if plain else torch.from_numpy(fold(poses.numpy()))
+                poses = frames[0, :, :KEYPOINTS]
+                poses = poses if self._plane.features == "window" else torch.from_numpy(fold(poses.numpy()))
                 features = poses.flatten().unfold(0, WINDOW * COORDINATES, COORDINATES)
-            return self._frames[0].double().numpy(), logits.double().numpy(), features.double().numpy()
+            return frames[0].double().numpy(), logits.double().numpy(), features.double().numpy()
 
     def _probabilities(self, logits: Floats, quality: Quality) -> Floats:
         """Calibrated probabilities (16, 3).

@@ -11,24 +11,24 @@ from anticipation.motion import DctMlpForecaster, LstmForecaster, MlpForecaster,
 from anticipation.outlook import FastOutlook, Outlook
 
 
-@pytest.mark.parametrize("frames", [15, 30])
+@pytest.mark.parametrize(("batch", "frames"), [(1, 15), (1, 30), (2, 30)])
 @pytest.mark.parametrize(
     "settings",
     [{}, {"centre": True}, {"widths": (8, 8, 12), "kernels": (3, 5, 9)}, {"widths": (8,), "kernels": (15,)}],
 )
-def test_the_classifier(settings, frames):
+def test_the_classifier(settings, batch, frames):
     torch.manual_seed(0)
     network = shaken(DirectedGraphNetwork(**settings))
     with torch.no_grad():
         for name, parameter in network.named_parameters():
             if "offset" in name:
                 parameter.normal_(0, 0.3)
-    sequence = torch.randn(1, frames, 13, 2)
+    sequence = torch.randn(batch, frames, 13, 2)
     quick = FastDirectedGraph(network)
     with torch.inference_mode():
         judgement = quick(sequence)
-        torch.testing.assert_close(judgement.logits, network(sequence)[0], atol=1e-5, rtol=1e-5)
-        torch.testing.assert_close(judgement.embedding, network.embedding(sequence)[0], atol=1e-5, rtol=1e-5)
+        torch.testing.assert_close(judgement.logits, network(sequence), atol=1e-5, rtol=1e-5)
+        torch.testing.assert_close(judgement.embedding, network.embedding(sequence), atol=1e-5, rtol=1e-5)
 
 
 @pytest.mark.parametrize("mode", ["direct", "rollout"])
