@@ -113,7 +113,7 @@ class Predictor:
                 len(frames) > 1
             ):  # the networks were not made symmetric; the mean with the mirror image is, and errs less
                 frames[1, :WINDOW] = mirrored(frames[0, :WINDOW])
-            for side in frames.split(1):
+            for side in (frames[at : at + 1] for at in range(len(frames))):
                 side[:, WINDOW:] = self._forecast(side[:, :WINDOW])
             judgement = self._classify(frames)
             logits = judgement.logits.mean(dim=0)
