@@ -13,18 +13,11 @@ from controller.mpc.structure import Structure
 
 
 class ProxQp:
-    """ProxQP's sparse solver, updated, started cold: warm starts made it call solvable problems infeasible."""
+    """ProxQP's sparse solver, set up in every step: updated in place, it calls answers solved that are off by half."""
 
     def __init__(self, structure: Structure) -> None:
         self._sparse = Sparse(structure)
-        self._solved = proxqp.QPSolverOutput.PROXQP_SOLVED
-        equations = structure.dynamics
-        n, limits = structure.cost.shape[0], structure.constraints.shape[0] - equations
-        self._solver = proxqp.sparse.QP(n, equations, limits)
-        self._solver.settings.eps_abs = 1e-5
-        self._solver.settings.max_iter = 1000
-        self._solver.settings.initial_guess = proxqp.InitialGuess.EQUALITY_CONSTRAINED_INITIAL_GUESS
-        self._fresh = True
+        self._shape = structure.cost.shape[0], structure.dynamics, structure.constraints.shape[0] - structure.dynamics
 
     def prepare(self, instance: Instance) -> Any:
         rows, equations = self._sparse.rows(instance).tocsr(), self._sparse.equations
@@ -39,11 +32,10 @@ class ProxQp:
         )
 
     def solve(self, prepared: Any) -> np.ndarray | None:
-        if self._fresh:
-            self._solver.init(*prepared)
-            self._fresh = False
-        else:
-            self._solver.update(*prepared)
-        self._solver.solve()
-        results = self._solver.results
-        return np.array(results.x[:4]) if results.info.status == self._solved else None
+        solver = proxqp.sparse.QP(*self._shape)
+        solver.settings.eps_abs = 1e-5
+        solver.settings.max_iter = 1000
+        solver.init(*prepared)
+        solver.solve()
+        solved = solver.results.info.status == proxqp.QPSolverOutput.PROXQP_SOLVED
+        return np.array(solver.results.x[:4]) if solved else None

@@ -1,0 +1,1 @@
+"""The MPC as C for a target without Python."""
