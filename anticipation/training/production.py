@@ -66,7 +66,7 @@ def make_checkpoint(
     made = fold_checkpoint(corpus, corpus.people, everything, pretrained, plan, seed, "all recordings", progress, run)
     protocol = "not evaluated" if evaluation is None else str(evaluation["protocol"])
     learnt = (*DATA, *(name for name in ("OUMVLP-Pose", "own") if any(track.source == name for track in _all(corpus))))
-    provenance = Provenance(learnt, LICENCE, protocol, {} if evaluation is None else dict(evaluation))
+    provenance = Provenance(learnt, LICENCE, protocol, {} if evaluation is None else _summary(evaluation))
     return replace(made, temperature=temperature, provenance=provenance)
 
 
@@ -120,6 +120,16 @@ def read_evaluation(path: Path) -> dict[str, Any]:
     if not isinstance(report, dict) or len(report.get("temperature", ())) != STEPS or "protocol" not in report:
         raise SourceError(f"evaluation '{path}' has no protocol or not {STEPS} temperatures: write it with --json")
     return report
+
+
+def _summary(evaluation: Mapping[str, Any]) -> dict[str, Any]:
+    """What a checkpoint says of its evaluation: how it was done, and the accuracy of each fold."""
+    kept = {name: evaluation[name] for name in ("protocol", "seed", "keypoints", "horizons_ms") if name in evaluation}
+    table = evaluation.get("tables", {}).get("urfd", {})
+    for kind in ("accuracy", "macro_f1"):
+        if evaluation.get("shipped") in table.get(kind, {}):
+            kept[kind] = table[kind][evaluation["shipped"]]
+    return kept
 
 
 def _all(corpus: Corpus) -> tuple[Track, ...]:
