@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ import typer
 from pydantic import BaseModel
 
 from bridge.cli import COMMANDS, _load, main
+from bridge.config.load import parse_config
 from bridge.config.surefoot import SurefootConfig
 
 REPO = Path(__file__).resolve().parent.parent
@@ -50,6 +52,18 @@ def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8")):
         if "://" not in target:
             assert (page.parent / target).exists(), f"{page.name} links to {target}"
+
+
+TABLES = [
+    (page.name, text.replace("\n   ", "\n"))
+    for page in PAGES
+    for text in re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+]
+
+
+@pytest.mark.parametrize(("page", "text"), TABLES, ids=[f"{page} {index}" for index, (page, _) in enumerate(TABLES)])
+def test_configurations_load(page: str, text: str) -> None:
+    parse_config(tomllib.loads(text), page)
 
 
 def keys(model: type[BaseModel], prefix: str) -> set[str]:

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 import zenoh
 from bridge_recordings import command, horizon
-from bridge_site import Site, key_of, session, tls_of
-from bridge_toys import wait_until
+from bridge_site import Site, key_of, make_keys, session, tls_of
+from bridge_toys import Stage, Up, all_alive, wait_until
 
 from bridge.clock import SystemClock
 from bridge.codec import encode
@@ -244,6 +244,19 @@ def test_a_flood_on_a_topic(site: Site, who: str, said: str) -> None:
             assert states <= {"FOLLOW", "RECOVER", "SAFE_STOP"}
         finally:
             attacker.kill()
+
+
+def test_surefoot_up_runs_on_certificates(tmp_path: Path) -> None:
+    """Launcher, monitor and processes, each with its own certificate."""
+    stage = Stage(tmp_path)
+    make_keys(tmp_path / "keys")
+    pairs = [f"bridge.endpoints.{role}=tls/127.0.0.1:{port}" for role, port in stage.ports.items()]
+    words = [word for pair in (f"bridge.keys={tmp_path / 'keys'}", *pairs) for word in ("--set", pair)]
+    with Up(stage, "--roles", "perception,controller", *words) as up:
+        up.wait_for(all_alive(("perception", "controller")))
+        up.wait_for(lambda record: record.get("command") and record["command"]["state"] == "FOLLOW")
+        code, errors = up.stop()
+    assert (code, errors) == (0, "")
 
 
 def test_an_observer_may_look(site: Site) -> None:
