@@ -16,8 +16,8 @@ test: $(VENV)/.dev
 
 # The property tests of the controller with a hundred times as many examples: about ten minutes.
 properties: $(VENV)/.dev
-	SUREFOOT_EXAMPLES=100 $(BIN)/python -m pytest tests/controller/test_controller_properties.py --timeout=3600 \
-	  --hypothesis-show-statistics
+	SUREFOOT_EXAMPLES=100 $(BIN)/python -m pytest tests/controller/test_controller_properties.py \
+	  tests/controller/test_controller_energy.py --timeout=3600 --hypothesis-show-statistics
 
 # Changes the safety gate in every way and asks its tests whether they notice: about ten minutes.
 mutate: $(VENV)/.mutate

@@ -4,8 +4,8 @@
 
 The shipped recording of a walk that ends in a fall goes through perception, anticipation, intervention, MPC, gate and a
 drive without a robot, in lock-step. The person's weight comes into the harness 0.8 s after the fall's onset (assumed:
-the recorded person lies after 1 s). Drawn are the horizon's risk, the stiffening profile made of it, the rendered damping
-and stiffness, what the plans predicted of base and column against what came, and the energy tank.
+the recorded person lies after 1 s). Drawn are the horizon's risk, the stiffening profile made of it, the rendered
+damping and stiffness, what the plans predicted of base and column against what came, and the energy tank.
 """
 
 from __future__ import annotations

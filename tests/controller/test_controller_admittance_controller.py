@@ -9,6 +9,7 @@ import pytest
 from controller_loop import MPC, NS, PERIOD_S, Loop, decision
 
 from bridge.config.admittance import AdmittanceConfig
+from bridge.config.mpc import MpcConfig
 from bridge.config.walker import WalkerConfig
 from bridge.errors import ConfigError
 from bridge.messages import GaitState, SupportCommand, Wrench
@@ -40,9 +41,14 @@ def test_it_is_a_controller() -> None:
     controller.reset()
 
 
+# What is shipped, with a wrench that is expected to fade; only the wall clock decides nothing here.
+SHIPPED = MpcConfig(time_limit_s=0.1)
+
+
+@pytest.mark.parametrize("mpc", [MPC, SHIPPED], ids=["held", "shipped"])
 @pytest.mark.parametrize("axis", range(3))
-def test_free_walking_is_the_stated_mass_and_damper(axis: int) -> None:
-    loop = Loop()
+def test_free_walking_is_the_stated_mass_and_damper(axis: int, mpc: MpcConfig) -> None:
+    loop = Loop(mpc=mpc)
     commands = loop.run(1.2, push(axis, SMALL[axis]))
     assert {command.solver for command in commands} == {"mpc"}
     time = PERIOD_S * np.arange(1, len(commands) + 1)
@@ -69,10 +75,9 @@ def spring_response(mass: float, damping: float, stiffness: float, force: float,
     return np.array(out)
 
 
-@pytest.mark.parametrize("axis", range(4))
-@pytest.mark.parametrize("s", [0.4, 1.0])
+@pytest.mark.parametrize(("axis", "s"), [(3, 0.0), *((axis, s) for axis in range(4) for s in (0.4, 1.0))])
 def test_constant_stiffening_is_the_stated_mass_spring_and_damper(axis: int, s: float) -> None:
-    loop = Loop()
+    loop = Loop(mpc=SHIPPED)
     loop.run(0.1, np.zeros(6), s)
     start = loop.pose.copy()
     times = PERIOD_S * np.arange(1, 51)
@@ -135,6 +140,41 @@ def test_left_and_right_are_mirror_images() -> None:
         wrench = np.array([40.0, 60.0 * np.sin(0.1 * k), -200.0, 2.0, 1.0, 5.0 * np.cos(0.2 * k)])
         a, b = one.step(wrench, s), other.step(wrench * wrenches, s)
         np.testing.assert_allclose(a.velocity, b.velocity * mirror, atol=3e-3)
+
+
+def test_a_person_who_pushes_on_is_not_opposed_faster_than_the_limits_allow() -> None:
+    """From 0.8 m/s into an arrest that comes out of nothing, still pushing: braked at the limits, no harder."""
+    loop = Loop(mpc=SHIPPED)
+    walking = loop.run(1.5, push(0, 30.0))
+    opposed = loop.run(0.6, push(0, 60.0), 1.0, state=GaitState.ARREST)
+    assert_within_limits(walking + opposed)
+    braking = np.array([command.acceleration[0] for command in opposed])
+    assert braking.min() < -0.9 * LIMITS.acceleration[0]  # it does brake
+    first = np.diff([walking[-1].acceleration[0], *braking])
+    assert first.min() >= -LIMITS.jerk[0] * PERIOD_S - 1e-9
+    along = velocities(opposed)[:, 0]
+    assert (np.diff(along) >= -LIMITS.acceleration[0] * PERIOD_S - 1e-9).all()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_stiffening_foreseen_never_makes_the_present_softer(seed: int) -> None:
+    """Two walkers with the same past and the same push; one of them foresees stiffening, at a random stage."""
+    random = np.random.default_rng(seed)
+    now = float(random.choice([0.0, 0.5 * random.random()]))
+    later = np.clip(now + 0.2 * np.maximum(np.arange(20) - random.integers(1, 19), 0), 0.0, 1.0)
+    wrench = np.zeros(6)
+    wrench[list(WRENCH_AXES)] = random.uniform(-1, 1, 4) * [30, 30, 5, 150]
+    commands = []
+    for profile in (later, np.full(20, now)):
+        loop = Loop(mpc=SHIPPED)
+        loop.run(0.5, wrench, now)
+        moving = np.sign(loop.velocity)
+        commands.append(loop.step(wrench, profile))
+    foreseen, flat = commands
+    assert (foreseen.damping >= flat.damping - 1e-9).all()
+    assert (foreseen.stiffness >= flat.stiffness - 1e-9).all()
+    # what the person feels: it never gets away faster
+    assert ((foreseen.acceleration - flat.acceleration) * moving <= 2e-3 * LIMITS.acceleration).all()
 
 
 def test_the_drives_lag_does_not_slow_the_command() -> None:

@@ -153,6 +153,17 @@ class TestWithoutVision:
         assert decision.reason == "harness load 500 N, limit 300"
         assert decision.stiffening == 1.0
 
+    @pytest.mark.parametrize(
+        "sight", [{"distance": 6.0}, {"quality": 0.0}, {"fall": 0.0, "transient": 0.0, "distance": 9.0}]
+    )
+    @pytest.mark.parametrize("felt", [{"load_n": 320.0}, {"descent": 0.31}])
+    def test_whatever_is_seen(self, sight: dict[str, Any], felt: dict[str, float]) -> None:
+        """Steady, nobody in view, surely stable: load and descent arrest within their dwell and one period."""
+        person = Person()
+        person.run(1.0, lambda t: sight)
+        person.run(SupervisorConfig().trigger_dwell_s + 0.011, lambda t: sight, **felt)
+        assert person.history[-1].state is GaitState.ARREST
+
     def test_descent(self) -> None:
         person = Person()
         person.run(1.0, walking)

@@ -40,6 +40,17 @@ def test_asking_for_more_never_gives_less(present: float, asked: np.ndarray, sta
     assert (profile(present, raised) >= profile(present, asked) - 1e-12).all()
 
 
+@settings(max_examples=60, deadline=None)
+@given(levels, asked_profiles, st.integers(0, STAGES), st.floats(0.0, 0.1))
+def test_what_comes_earlier_never_gives_a_softer_present(
+    present: float, asked: np.ndarray, sooner: int, elapsed_s: float
+) -> None:
+    """The same rise, some stages earlier: nothing in the profile is softer for it, the present least of all."""
+    rising = np.sort(asked)
+    earlier = np.concatenate([rising[sooner:], np.full(sooner, rising[-1])])
+    assert (profile(present, earlier, elapsed_s) >= profile(present, rising, elapsed_s) - 1e-12).all()
+
+
 @settings(max_examples=100, deadline=None)
 @given(asked_profiles)
 def test_never_less_than_asked_once_it_could_rise(asked: np.ndarray) -> None:
