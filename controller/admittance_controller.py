@@ -103,7 +103,7 @@ class AdmittanceController:
         self._stop_damping: Floats = np.array(admittance.damping_arrest)
         self._stop_stiffness: Floats = np.array(admittance.stiffness_stop)
         self._admittance = Admittance(admittance, mpc.stage_s, self._fading)
-        self._predictive = PredictiveLaw(self._walker, self._admittance, self._machine, mpc, period_s)
+        self._predictive = PredictiveLaw(self._walker, self._admittance, mpc, period_s)
         self._motion = CommandedMotion(mpc, self._limits, (walker.column_low_m, walker.column_high_m))
         self.reset()
 

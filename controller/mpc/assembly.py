@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class Assembly:
     """
 
     def __init__(self, structure: Structure, compile_c: bool = True) -> None:
-        matrices, vectors = compiled([structure.matrices, structure.vectors], compile_c)
+        matrices, vectors = _functions(structure, compile_c)
         damping, stiffness, load = (np.zeros(4 * structure.setting.stages) for _ in range(3))
         self._point: Floats = np.zeros(vectors.nnz_in(0))
         self._damping, self._stiffness, self._load = damping, stiffness, load
@@ -84,3 +85,9 @@ class Assembly:
         P, A = self._matrices.outputs
         q, lower, upper = self._vectors.outputs[:3]
         return Problem(P, q, A, lower, upper, changed)
+
+
+@lru_cache(maxsize=8)
+def _functions(structure: Structure, compile_c: bool) -> tuple[Any, Any]:
+    matrices, vectors = compiled([structure.matrices, structure.vectors], compile_c)
+    return matrices, vectors

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
 from bridge.config.mpc import MpcConfig
+from bridge.config.walker import WalkerConfig
 from bridge.messages import Floats
 from controller.admittance import Admittance
 from controller.machine_limits import MachineLimits
@@ -25,7 +27,6 @@ class PredictiveLaw:
     Args:
         walker: the model.
         admittance: the law (for the rendered mass).
-        machine: linear limits on the acceleration (for what does not change in them).
         config: horizon, weights, solver.
         period_s: control period, for which the first acceleration is applied [s].
 
@@ -37,10 +38,8 @@ class PredictiveLaw:
         MissingExtraError: the solver's package is not installed.
     """
 
-    def __init__(
-        self, walker: Walker, admittance: Admittance, machine: MachineLimits, config: MpcConfig, period_s: float
-    ) -> None:
-        self.structure: Structure = build(setting(walker, admittance, config, period_s), walker, machine)
+    def __init__(self, walker: Walker, admittance: Admittance, config: MpcConfig, period_s: float) -> None:
+        self.structure = structure_of(walker.config, tuple(admittance.mass.tolist()), config, period_s)
         self._assembly = Assembly(self.structure, config.compile_c)
         self._solver = solvers.create(self.structure, config)
 
@@ -68,22 +67,24 @@ class PredictiveLaw:
         return self._solver.solve(self.last_problem)
 
 
-def setting(walker: Walker, admittance: Admittance, config: MpcConfig, period_s: float) -> Setting:
-    """Return what the problem's structure is built from."""
-    motion = MotionLimits(walker.config)
-    return Setting(
+@lru_cache(maxsize=8)
+def structure_of(walker: WalkerConfig, mass: tuple[float, ...], config: MpcConfig, period_s: float) -> Structure:
+    """Return the structure of a configuration; it holds no state, so controllers of one configuration share it."""
+    motion, model = MotionLimits(walker), Walker(walker)
+    setting = Setting(
         stages=config.stages,
         stage_s=config.stage_s,
         period_s=period_s,
         acceleration=motion.acceleration,
         velocity=motion.velocity,
         jerk=motion.jerk,
-        wheel_speed=walker.wheel_jacobian / walker.config.wheel_speed_max_rad_s,
-        mass=admittance.mass,
+        wheel_speed=model.wheel_jacobian / walker.wheel_speed_max_rad_s,
+        mass=np.array(mass),
         increment_weight=config.increment_weight,
         fading=fading(config),
-        stroke_m=(walker.config.column_low_m, walker.config.column_high_m),
+        stroke_m=(walker.column_low_m, walker.column_high_m),
     )
+    return build(setting, model, MachineLimits(model))
 
 
 def remaining(config: MpcConfig, age_s: float) -> float:

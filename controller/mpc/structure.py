@@ -114,7 +114,7 @@ POINT = Point()
 POINT_SIZE = 20
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Structure:
     """Patterns, row layout and functions of the problem, arrays flat in rows of stages.
 

@@ -37,7 +37,7 @@ class Bench:
         self.fading = fading(config)
         self.machine = MachineLimits(self.walker)
         self.admittance = Admittance(AdmittanceConfig(), config.stage_s, self.fading)
-        self.law = PredictiveLaw(self.walker, self.admittance, self.machine, config, PERIOD_S)
+        self.law = PredictiveLaw(self.walker, self.admittance, config, PERIOD_S)
 
     def instant(
         self,

@@ -17,8 +17,8 @@ from controller.admittance import Admittance
 from controller.machine_limits import DRIVE_ROWS, TIP_ROWS, MachineLimits
 from controller.mpc import compiled, condensing, symbolic_walker
 from controller.mpc.assembly import Assembly, Instant
-from controller.mpc.predictive_law import fading, setting
-from controller.mpc.structure import DRIVE_SCALE, TIP_SCALE, Structure, build
+from controller.mpc.predictive_law import fading, structure_of
+from controller.mpc.structure import DRIVE_SCALE, TIP_SCALE, Structure
 from controller.mpc.workspace import Workspace
 from controller.walker import Walker
 
@@ -32,7 +32,7 @@ ADMITTANCE = Admittance(AdmittanceConfig(), CONFIG.stage_s, FADING)
 
 @pytest.fixture(scope="module")
 def structure() -> Structure:
-    return build(setting(WALKER, ADMITTANCE, CONFIG, 0.01), WALKER, LIMITS)
+    return structure_of(WALKER.config, tuple(ADMITTANCE.mass.tolist()), CONFIG, 0.01)
 
 
 def random_instant(random: np.random.Generator, push: float) -> Instant:

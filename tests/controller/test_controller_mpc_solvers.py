@@ -16,7 +16,6 @@ from bridge.config.walker import WalkerConfig
 from bridge.errors import MissingExtraError
 from bridge.messages import SupportCommand
 from controller.admittance import Admittance
-from controller.machine_limits import MachineLimits
 from controller.mpc import daqp_solver, solvers
 from controller.mpc.assembly import Assembly, Instant
 from controller.mpc.plan import Failure, Plan
@@ -31,7 +30,7 @@ CONFIG = MpcConfig(time_limit_s=0.1, max_iterations=5000)
 SCALE = np.array(WalkerConfig().acceleration_max)
 WALKER = Walker(WalkerConfig())
 ADMITTANCE = Admittance(AdmittanceConfig(), CONFIG.stage_s, fading(CONFIG))
-LAW = PredictiveLaw(WALKER, ADMITTANCE, MachineLimits(WALKER), CONFIG, 0.01)
+LAW = PredictiveLaw(WALKER, ADMITTANCE, CONFIG, 0.01)
 ASSEMBLY = Assembly(LAW.structure)
 ROWS = LAW.structure.rows
 

@@ -15,14 +15,12 @@ import osqp
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import SurefootError
 from controller.admittance import Admittance, AdmittanceStages
-from controller.machine_limits import MachineLimits
 from controller.mpc.assembly import RELINEARISE_M, Assembly, Instant
 from controller.mpc.osqp_solver import INFINITY, bindings
-from controller.mpc.predictive_law import fading, setting
+from controller.mpc.predictive_law import fading, structure_of
 from controller.mpc.solver import clipped
-from controller.mpc.structure import Structure, build
+from controller.mpc.structure import Structure
 from controller.mpc.workspace import Workspace
-from controller.walker import Walker
 
 _OWN = ("surefoot_mpc.h", "surefoot_mpc.c", "main.c", "README.md")
 _PREFIX = "surefoot_osqp_"
@@ -50,10 +48,8 @@ def export(config: SurefootConfig, folder: Path) -> None:
 
 
 def _write(config: SurefootConfig, folder: Path) -> None:
-    walker = Walker(config.walker)
     admittance = Admittance(config.admittance, config.mpc.stage_s, fading(config.mpc))
-    period_s = 1.0 / config.controller.rate_hz
-    structure = build(setting(walker, admittance, config.mpc, period_s), walker, MachineLimits(walker))
+    structure = structure_of(config.walker, config.admittance.mass, config.mpc, 1.0 / config.controller.rate_hz)
     for name in _OWN:
         text = resources.files("controller.mpc.export").joinpath(name).read_text("utf-8")
         (folder / name).write_text(text, encoding="utf-8")
