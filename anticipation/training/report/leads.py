@@ -32,6 +32,7 @@ def leads(events: Mapping[str, Any]) -> Figure:
     axes.axvline(0.0, color=FALL, lw=1.2)
     axes.set_yticks(rows, [_name(fall) for fall in falls], fontsize=7)
     axes.set_ylim(-0.7, len(falls) - 0.3)
+    axes.set_xlim(None, 0.12)
     plain(axes, "", "time since the first lying frame [s]")
     axes.tick_params(axis="y", labelsize=7)
     axes.legend(fontsize=8, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, handletextpad=0.4)
