@@ -14,8 +14,9 @@ from bridge.config.admittance import AdmittanceConfig
 from controller.admittance import Admittance, one_step
 
 HISTORIES = 100 * int(os.environ.get("SUREFOOT_EXAMPLES", "1"))
-STAGES, STAGE_S, PERIOD_S, STEPS = 20, 0.025, 0.01, 60
+STAGES, STAGE_S, PERIOD_S, STEPS = 20, 0.025, 0.02, 60
 CONFIG = AdmittanceConfig()
+LEVELS = (0.0, 0.03, 0.1, 0.4, 1.0)  # a soft spring that a walking person stretches, made stiff, is what costs energy
 WEIGHT = np.array([80.0, 80.0, 10.0, 300.0])  # of random pushes along x, y, yaw, height [N, N m]
 
 
@@ -30,16 +31,16 @@ class Ledger(NamedTuple):
 
 def history(random: np.random.Generator) -> Ledger:
     """Run the law, rendered exactly, through random profiles, pushes and let-goes."""
-    initial_j = float(random.choice([0.0, random.uniform(0.0, CONFIG.tank_capacity_j)]))
+    initial_j = float(random.choice([0.0, 0.0, random.uniform(0.0, CONFIG.tank_capacity_j)]))
     law = Admittance(AdmittanceConfig(tank_initial_j=initial_j), STAGE_S, np.ones(STAGES))
-    pose, velocity = np.array([0.0, 0.0, 0.0, CONFIG.height_hold_m]), random.normal(0, 0.3, 4)
+    pose, velocity = np.array([0.0, 0.0, 0.0, CONFIG.height_hold_m]), random.normal(0, [0.6, 0.6, 0.6, 0.1])
     there = float(0.5 * law.mass @ velocity**2) + initial_j
     given = exchanged = 0.0
     most_delivered = worst_stored = -np.inf
     level, force = 0.0, np.zeros(4)
     for _ in range(STEPS):
         if random.random() < 0.15:
-            level = float(random.choice([0.0, random.random(), 1.0]))
+            level = float(random.choice(LEVELS))
         if random.random() < 0.15:
             force = random.normal(0, WEIGHT) * random.choice([0.0, 1.0])
         stages = law.stages(np.full(STAGES, level), pose, velocity, force)
@@ -72,6 +73,6 @@ def test_never_more_energy_is_delivered_than_was_taken_and_the_tank_held() -> No
         assert ledger.most_delivered <= ledger.there + 1e-9
         # Stronger: at no time is more stored than was there and was put in. The spring's axes turn within a step, which
         # leaves a remainder of second order.
-        assert ledger.worst_stored <= 0.01 * (1.0 + ledger.exchanged)
+        assert ledger.worst_stored <= 1e-3 * (1.0 + ledger.exchanged)
         paid_for += ledger.exchanged > 1.0
     assert paid_for > 0.5 * HISTORIES, "the histories exchange energy worth speaking of"
