@@ -145,7 +145,7 @@ class MixerBlock(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Mix (B, 15, width)."""
-        x = x + self.time(self.norm_time(x).mT).mT
+        x = x + self.time(self.norm_time(x).transpose(1, 2)).transpose(1, 2)
         mixed: Tensor = x + self.dropout(nn.functional.gelu(self.space(self.norm_space(x))))
         return mixed
 

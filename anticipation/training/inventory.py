@@ -146,10 +146,9 @@ def _urfd(folder: Path) -> list[Source]:
 
 
 def _urfd_daily(folder: Path) -> list[Source]:
-    return [
-        describe("URFD adl-40", urfd.read_daily(folder)),
-        describe("URFD daily, 8 keypoints", read_partial(folder)),
-    ]
+    partial = read_partial(folder)
+    exact = describe("URFD adl-40", urfd.read_daily(folder))
+    return [exact, describe("URFD daily, 8 keypoints", partial)] if partial else [exact]
 
 
 def _upfall(folder: Path) -> list[Source]:
