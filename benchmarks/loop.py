@@ -108,7 +108,7 @@ def measure(seconds: float, overrides: list[str]) -> dict[str, Any]:
                     _alone(pid, launcher.poll()["drive"].pid)
                 elif now_ns > start_ns + 60 * NS:
                     raise SystemExit(f"no command from a plan within 60 s: {launcher.poll()['controller'].last_line}")
-            elif len(commands) % 10 == 0:
+            elif outbox.sent % 10 == 0:
                 memory.append(_resident_bytes(pid))
         commands.extend(tap.drain())  # type: ignore[arg-type]
     period_ns = round(NS / config.controller.rate_hz)
