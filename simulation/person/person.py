@@ -28,6 +28,9 @@ CONTROL_S: Final = 0.004
 GRAVITY: Final = 9.81
 UPPER_REST: Final = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.1, -0.1, -0.3, -0.3])
 LIMP_KD: Final = 1.0
+URGE_GAIN: Final = 0.08  # per step
+URGE_MOST_M_S: Final = 0.12
+FASTEST_M_S: Final = 1.15  # planned: beyond it these reflexes lose their balance by themselves
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +98,8 @@ class Person:
         self._speed = 0.0
         self._time_in_step = 0.0
         self._step = plan_step(0.0, size.height_m, self.width_m, ability)
+        self._urge = 0.0  # what a person adds to the wanted speed when the last steps fell short of it [m/s]
+        self._began_at = (0.0, 0.0)  # where the centre of mass was at the last touchdown
         self._swing_from: Floats | None = None
         self._swing_began_s = 0.0
         self._foothold = (0.0, 0.0)
@@ -182,16 +187,29 @@ class Person:
         if not ((landed and self._time_in_step > 0.9 * planned) or self._time_in_step > planned + 0.15):
             return
         self.steps += 1
+        self._learn()
         wants_rest = intent.speed_m_s < 0.02 and self._speed < 0.05
         if wants_rest and not self._astray(dcm, lead, trail, heading):
             self._standing, self._swing_from = True, None
         else:
             self._begin(self.swing)
 
+    def _learn(self) -> None:
+        """Walk a little harder after a step that was slower than wanted, and the other way round."""
+        com = self._data.subtree_com[self.pelvis]
+        way = (float(com[0]) - self._began_at[0]) * cos(self.heading_rad)
+        way += (float(com[1]) - self._began_at[1]) * sin(self.heading_rad)
+        short = self._speed - way / self._time_in_step
+        self._urge = min(max(self._urge + URGE_GAIN * short, -URGE_MOST_M_S), URGE_MOST_M_S) if self._speed > 0 else 0.0
+
     def _begin(self, stance: str) -> None:
         self._standing = False
         self.stance, self._time_in_step, self._swing_from = stance, 0.0, None
-        self._step = plan_step(self._speed, self.size.height_m, self.width_m, self.ability)
+        com = self._data.subtree_com[self.pelvis]
+        self._began_at = (float(com[0]), float(com[1]))
+        self._step = plan_step(
+            min(self._speed + self._urge, FASTEST_M_S), self.size.height_m, self.width_m, self.ability
+        )
 
     def _astray(self, dcm: tuple[float, float], lead: Sole, trail: Sole, heading: tuple[float, float]) -> bool:
         """Whether standing still can no longer keep the DCM over the feet."""
