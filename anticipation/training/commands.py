@@ -40,11 +40,13 @@ Folds = Annotated[int, typer.Option(min=2, max=24, help="Folds, divided by recor
 Seed = Annotated[int, typer.Option(min=0, help="Seed of folds, draws and weights.")]
 RunFolder = Annotated[
     Path | None,
-    typer.Option("--run", help="Folder of the run's states and log; default: OUT.run.", show_default=False),
+    typer.Option("--run-folder", help="Folder of the run's states and log; default: OUT.run.", show_default=False),
 ]
 Logged = Annotated[
     bool | None,
-    typer.Option("--log/--no-log", help="Log to TensorBoard; default: where it is installed.", show_default=False),
+    typer.Option(
+        "--tensorboard/--no-tensorboard", help="Log to TensorBoard; default: where it is installed.", show_default=False
+    ),
 ]
 
 

@@ -91,7 +91,7 @@ class Journal:
         if saved.facts.get("fingerprint") != fingerprint:
             raise SurefootError(
                 f"{path}: '{name}' began with other data, settings or versions; "
-                "name another folder with --run, or forget this one with --fresh"
+                "name another folder with --run-folder, or forget this one with --fresh"
             )
         return saved
 
@@ -134,7 +134,9 @@ class Journal:
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
-            raise SurefootError(f"another process trains in '{self.folder}': name another folder with --run") from error
+            raise SurefootError(
+                f"another process trains in '{self.folder}': name another folder with --run-folder"
+            ) from error
 
     def _compare(self, path: Path, settings: dict[str, Any]) -> None:
         try:
@@ -146,7 +148,7 @@ class Journal:
             if before != now:
                 raise SurefootError(
                     f"the run in '{self.folder}' was begun with {name} {before}, now it is {now}: "
-                    "give the same, name another folder with --run, or forget that run with --fresh"
+                    "give the same, name another folder with --run-folder, or forget that run with --fresh"
                 )
 
     def _clear(self) -> None:

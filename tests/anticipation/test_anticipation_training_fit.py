@@ -125,7 +125,7 @@ def test_the_paper_s_recipe_makes_the_paper_s_networks(made_data, tmp_path):
     measured.write_text(json.dumps({"protocol": "none", "temperature": [1.0] * (HORIZON + 1)}))
     out = tmp_path / "weights.safetensors"
     options = ["train", "--data", str(made_data), "--quick", "--recipe", "paper", "--evaluation", str(measured)]
-    result = CliRunner().invoke(commands(), [*options, "--no-log", "--out", str(out)], catch_exceptions=False)
+    result = CliRunner().invoke(commands(), [*options, "--no-tensorboard", "--out", str(out)], catch_exceptions=False)
     assert result.exit_code == 0
     made = checkpoint.load(out)
     assert isinstance(made.forecaster, LstmForecaster)

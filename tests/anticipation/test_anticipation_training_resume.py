@@ -8,12 +8,14 @@ from pathlib import Path
 
 import pytest
 import torch
+import typer
 from anticipation_people import falling, make_data
 from safetensors.torch import load_file
 
 from anticipation.motion import DctMlpForecaster
 from anticipation.training import fitting
 from anticipation.training.clips import Clip
+from anticipation.training.commands import train
 from anticipation.training.journal import Journal, Saved
 from anticipation.training.run import Run
 from anticipation.training.samples import clean, cut
@@ -75,6 +77,23 @@ def test_two_processes_find_what_one_finds(tmp_path):
     for name, value in alone.items():
         assert torch.equal(first[name], second[name]), f"{name} differs between the processes"
         assert torch.allclose(first[name], value, rtol=0, atol=1e-6), name
+
+
+def test_torchrun_takes_no_option_of_ours_for_its_own():
+    """It reads abbreviations of its own options even behind the command: `--run` could be its `--run-path`."""
+    from torch.distributed.run import get_args_parser
+
+    command = typer.main.get_command(train_app())
+    options = [name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)]
+    assert "--run-folder" in options
+    words = ["--no-python", "surefoot", "train", *options]
+    assert get_args_parser().parse_args(words).training_script_args == words[2:]
+
+
+def train_app():
+    app = typer.Typer()
+    app.command()(train)
+    return app
 
 
 def run_of(folder, settings=None, **options):
