@@ -105,6 +105,8 @@ def _cell(row: Row | None) -> str:
         return MISSING
     if row["problems"]:
         return f"**failed**: {'; '.join(row['problems'])}"
+    if row["group"] == "arrest":
+        return "stays stiff"
     return "works on" if row["limit_ms"] is None else f"{row['safe_ms']:.0f} (limit {row['limit_ms']:.0f})"
 
 
