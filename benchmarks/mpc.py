@@ -244,6 +244,7 @@ def compare(seconds: float, say: Callable[[str], None]) -> dict[str, Row]:
             f"median {wall['p50_ms']:.3f}, p99 {wall['p99_ms']:.3f}, max {wall['max_ms']:.3f} ms; "
             f"iterations median {spent[0]:.0f}, p99 {spent[1]:.0f}, max {spent[2]:.0f}; "
             f"matrices changed in {sum(i.matrices_changed for i in found.instances)} of {len(found.instances)} steps"
+            + "".join(f"; unsolved: {reason}" for reason in sorted(set(found.unsolved)))
         )
     assert ours is not None
     warnings.simplefilter("ignore")  # do-mpc speaks of features that nobody asked for

@@ -34,7 +34,7 @@ class MpcConfig(Section):
     """Build the problem's functions as C, once into a cache, where there is a C compiler; else they are interpreted."""
 
     max_iterations: int = Field(default=600, ge=1, le=20000)
-    """Most iterations of the solver for one step; `daqp` needs ten, `piqp` twenty, `osqp` fifty at its worst."""
+    """Most iterations of the solver for one step; `daqp` needs a dozen at worst, `piqp` twenty, `osqp` some hundred."""
 
     time_limit_s: float = Field(default=0.008, gt=0, le=0.1)
     """Most time of the solver for one step, on the wall clock [s]; keep it below the control period."""
