@@ -9,10 +9,10 @@ the quality and the transient plane after it, which need no PyTorch (`perception
 from __future__ import annotations
 
 import importlib.util
-import io
 import json
 import warnings
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -131,27 +131,27 @@ def _graph(judge: Judge) -> bytes:
 
     The tracing exporter is used: the newer one takes ten times as long, and longer for an LSTM.
     """
-    content = io.BytesIO()
     names = (WINDOW_NAME, PROBABILITIES, FORECAST)
-    with warnings.catch_warnings():
+    with TemporaryDirectory() as scratch, warnings.catch_warnings():
+        traced = Path(scratch) / GRAPH_FILE
         warnings.filterwarnings("ignore", "You are using the legacy TorchScript-based ONNX export", DeprecationWarning)
         warnings.filterwarnings("ignore", "The feature will be removed", DeprecationWarning)  # of its own parts
         # an LSTM compares the width of its input, which no batch changes
-        warnings.filterwarnings("ignore", category=torch.jit.TracerWarning, module=r"torch\.nn\.modules\.rnn")
+        warnings.filterwarnings("ignore", category=Warning, module=r"torch\.nn\.modules\.rnn")
         warnings.filterwarnings(
             "ignore", "Exporting a model to ONNX with a batch_size other than 1", UserWarning
         )  # LSTM
         torch.onnx.export(
             judge,
             (torch.zeros(2, WINDOW, ROWS, 2),),
-            content,
+            traced,
             dynamo=False,
             opset_version=OPSET,
             input_names=[WINDOW_NAME],
             output_names=[PROBABILITIES, FORECAST],
             dynamic_axes={name: {0: "batch"} for name in names},
         )
-    return content.getvalue()
+        return traced.read_bytes()
 
 
 def _describe(checkpoint: Checkpoint, origin: str, differences: dict[str, float]) -> dict[str, Any]:
