@@ -11,9 +11,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from bridge.assess.run import Assessment
+from bridge.colours import FAINT, FALL, INK, STABLE, STATE_COLOUR, TRANSIENT
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import SurefootError
-from bridge.launch.picture import FAINT, FALL, INK, STABLE, STATE_COLOUR, TRANSIENT
 from bridge.messages import STEP_S, Floats
 
 AHEAD: Final = "#00868b"
@@ -202,7 +202,7 @@ def spread(places: Sequence[float], gap: float) -> list[float]:
         ):
             last = groups.pop()
             groups[-1].extend(last)
-    moved = []
+    moved: list[float] = []
     for group in groups:
         first = _centre(group) - 0.5 * gap * (len(group) - 1)
         moved.extend(first + gap * index for index in range(len(group)))

@@ -110,7 +110,8 @@ class WireLog:
 
     def __enter__(self) -> Self:
         if "RUST_LOG" in os.environ:
-            zenoh.try_init_log_from_env()
+            start: Any = zenoh.try_init_log_from_env  # its stub says nothing of what it returns
+            start()
             self._thread.start()
             return self
         self._memory = os.memfd_create("zenoh-log")

@@ -42,9 +42,8 @@ _ROLE_COLOUR: Final = {
     "controller": "#b98bdc",
     "drive": "#7ccf7c",
 }
-_TOPIC_COLOUR: Final = dict(
-    zip((topic.key for topic in TOPICS), (FORECAST, TRANSIENT, FALL, "#7ccf7c", "#b98bdc", "", FORECAST, FAINT), strict=True)
-)
+_COLOURS: Final = (FORECAST, TRANSIENT, FALL, "#7ccf7c", "#b98bdc", "", FORECAST, FAINT)
+_TOPIC_COLOUR: Final = dict(zip((topic.key for topic in TOPICS), _COLOURS, strict=True))
 
 
 class HealthPanel:
