@@ -34,9 +34,7 @@ COMMANDS: Final = {
     "up": Command("bridge.launch.command:up", "Run the processes and watch over them."),
     "codegen": Command("controller.mpc.export.command:codegen", "Write the MPC as C for a real-time target."),
     "config": Command("bridge.config.command:config", "Print a configuration file with every key and its meaning."),
-    "demo": Command(
-        "simulation.trial.command:demo", "A simulated person is pushed, with help and without."
-    ),
+    "demo": Command("simulation.trial.command:demo", "A simulated person is pushed, with help and without."),
     "rehearse": Command("bridge.launch.rehearse:rehearse", "Run it all on a recorded stumble, without physics."),
     "assess": Command("bridge.assess.command:assess", "Assess keypoint clips offline with the code that runs live."),
     "latency": Command("bridge.latency.command:latency", "Measure newest frame to command on the wire, hop by hop."),
