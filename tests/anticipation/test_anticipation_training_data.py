@@ -116,7 +116,7 @@ def test_the_detector_moves_points_by_little_and_some_by_much():
     points = np.tile(STANDING + 100, (400, 1, 1))
     seen = observe(points, np.random.default_rng(0))
     error = np.linalg.norm(seen[..., :2] - points, axis=-1) / 50  # the trunk is 50 px long
-    assert 0.02 < np.median(error) < 0.12
+    assert 0.02 < np.nanmedian(error) < 0.12  # in some frames nobody is found
     assert 0.002 < (error > 0.5).mean() < 0.1
     assert (seen[..., 2] >= 0).all()
     assert (seen[..., 2] <= 1).all()
