@@ -23,6 +23,8 @@ CONFINED = {
     "zenoh": ("bridge/",),
     "casadi": ("controller/mpc/",),
     "osqp": ("controller/mpc/",),
+    "daqp": ("controller/mpc/",),
+    "piqp": ("controller/mpc/",),
     "pinocchio": ("controller/walker.py",),
     "pickle": (),
 }

@@ -66,7 +66,13 @@ class Kernel:
 def compiled(functions: Sequence[Any], wanted: bool = True) -> list[Any]:
     """Return CasADi functions as machine code, or as they are where none can be made or is `wanted`."""
     path = library(source("surefoot_kernels", functions), "-O1") if wanted else None
-    return list(functions) if path is None else [ca.external(function.name(), str(path)) for function in functions]
+    if path is None:
+        return list(functions)
+    try:
+        return [ca.external(function.name(), str(path)) for function in functions]
+    except RuntimeError as error:  # damaged, or on a file system that nothing may be executed from
+        _log.warning("%s cannot be loaded (%s): the MPC runs in CasADi's virtual machine", path, _line(error))
+        return list(functions)
 
 
 def library(text: str, effort: str = "-O3") -> Path | None:
@@ -84,7 +90,7 @@ def library(text: str, effort: str = "-O3") -> Path | None:
         if not path.exists():
             _log.info("building the MPC's C code, once for this configuration: %s", path)
             _build([*compiler.split(), effort], text, path)
-    except (OSError, subprocess.SubprocessError) as error:
+    except (OSError, RuntimeError, subprocess.SubprocessError) as error:  # RuntimeError: there is no home
         _log.warning("the MPC's C code could not be built (%s): it runs in CasADi's virtual machine", _line(error))
         return None
     return path

@@ -6,7 +6,9 @@ Both ways fill the same arrays with the same numbers (tested). Nothing is alloca
 from __future__ import annotations
 
 import ctypes
+import logging
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,8 @@ from controller.mpc.compiled import Kernel, library
 from controller.mpc.condensing import Condensed
 from controller.mpc.problem import Problem
 from controller.mpc.structure import Structure
+
+_log = logging.getLogger(__name__)
 
 _INTEGERS = ("stages", "limited", "n", "m", "cost_count", "constraint_count", "condensed_rows")
 _LAYOUT = ("limited_stages", "cost_columns", "cost_rows", "constraint_columns", "constraint_rows")
@@ -61,9 +65,10 @@ class Workspace:
         self.low, self.high, self.multipliers = np.zeros(rows), np.zeros(rows), np.zeros(rows)
         self._room: Floats = np.zeros(n + m + stages * (stages + 4))
         path = library(resources.files("controller.mpc").joinpath("loops.c").read_text("utf-8")) if compile_c else None
-        self.compiled = path is not None
-        if path is not None:
-            self._load(str(path))
+        code = _loaded(path)
+        self.compiled = code is not None
+        if code is not None:
+            self._bind(code)
         else:
             self._interpret()
 
@@ -96,8 +101,7 @@ class Workspace:
         """Fill `x` and `y` from `z` and `multipliers`."""
         self._expand()
 
-    def _load(self, path: str) -> None:
-        code = ctypes.CDLL(path)
+    def _bind(self, code: ctypes.CDLL) -> None:
         structure, condensed = self._structure, self._condensed
         layout: dict[str, Any] = {
             "limited_stages": structure.setting.sparse_stages,
@@ -165,3 +169,13 @@ class Workspace:
             self.U[columns] = inverse
             self.M[rows, columns] = own[: rows.stop - rows.start]
             self.M[condensed.shared_rows, columns] = shared
+
+
+def _loaded(path: Path | None) -> ctypes.CDLL | None:
+    if path is None:
+        return None
+    try:
+        return ctypes.CDLL(str(path))
+    except OSError as error:
+        _log.warning("%s cannot be loaded (%s): the MPC's checks are interpreted", path, error)
+        return None

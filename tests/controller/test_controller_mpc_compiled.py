@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -212,6 +213,20 @@ def test_code_is_built_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> 
     stamp = built.stat().st_mtime_ns
     assert called(compiled.compiled([square()])[0]) == [4.0, 9.0]
     assert built.stat().st_mtime_ns == stamp
+
+
+def test_a_damaged_library_is_said_and_interpreted(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, structure: Structure, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("SUREFOOT_CACHE", str(tmp_path))
+    # Built and not yet loaded: what a process has loaded once it keeps, whatever becomes of the file.
+    loops = resources.files("controller.mpc").joinpath("loops.c").read_text("utf-8")
+    for path in (compiled.library(compiled.source("surefoot_kernels", [square()]), "-O1"), compiled.library(loops)):
+        assert path is not None
+        path.write_bytes(b"no library")
+    assert called(compiled.compiled([square()])[0]) == [4.0, 9.0]
+    assert not Workspace(structure).compiled
+    assert caplog.text.count("cannot be loaded") == 2
 
 
 def test_a_cache_that_others_may_write_to_is_not_trusted(
