@@ -9,16 +9,18 @@ import numpy as np
 from bridge.clock import NS, Clock, nanoseconds
 from bridge.config.perception import PerceptionConfig
 from bridge.errors import SurefootError
+from bridge.inbox import Inbox
 from bridge.messages import Floats, Keypoints, KeypointStatus, NodeStatus
 from bridge.node import NodeContext, main
 from bridge.outbox import Outbox
 from bridge.timing import RecentRate
-from bridge.topics import KEYPOINTS
+from bridge.topics import DETECTIONS, KEYPOINTS
 from perception.estimators.interface import PoseEstimator, load_estimator
 from perception.pipeline import PerceptionPipeline
 from perception.sources.frame import Frame, Source
 from perception.sources.open import open_source
 from perception.sources.picture import parse_crop
+from perception.sources.wire import DEPTH, WireSource
 
 _MOST_FRAMES_A_STEP = 8  # so that a fast source cannot keep the loop from its status and its signals
 _STALL_REPEAT_S = 0.1
@@ -162,7 +164,11 @@ def create(context: NodeContext) -> PerceptionNode:
         source_config = source_config.model_copy(update={"crop_px": parse_crop(context.options["crop"])})
     name = context.options.get("estimator") or config.estimator
     uri = context.options.get("source") or source_config.uri
-    source = open_source(uri, source_config, context.clock, context.transport)
+    source: Source = (
+        WireSource(Inbox(context.transport, DETECTIONS, depth=DEPTH))
+        if uri == "wire"
+        else open_source(uri, source_config, context.clock)
+    )
     try:
         estimator = load_estimator(name, config) if source.gives_images else None
     except SurefootError:

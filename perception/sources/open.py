@@ -8,14 +8,12 @@ from pathlib import Path
 from bridge.clock import Clock
 from bridge.config.perception import SourceConfig
 from bridge.errors import SourceError
-from bridge.transport.interface import Transport
 from perception.sources.camera import open_camera
 from perception.sources.frame import Source
 from perception.sources.image_folder import open_folder
 from perception.sources.keypoint_file import read_clip, stills
 from perception.sources.playback import Playback
 from perception.sources.video_file import open_video
-from perception.sources.wire import WireSource
 
 _NPZ = re.compile(r"^(?P<file>.+\.npz)(?::(?P<clip>.*))?$")
 _CAMERA = re.compile(r"^camera:(?P<number>\d+)$")
@@ -23,15 +21,13 @@ _URL = re.compile(r"^(https?|rtsps?|rtmp|udp|tcp)://")
 _FORMS = "FILE.npz:CLIP[/ARRAY], a video file, a folder of images, camera:N, a URL or wire"
 
 
-def open_source(spec: str, config: SourceConfig, clock: Clock, transport: Transport | None = None) -> Source:
+def open_source(spec: str, config: SourceConfig, clock: Clock) -> Source:
     """Open the source that `spec` names.
 
     Args:
-        spec: `FILE.npz:CLIP[/ARRAY]`, a video file, a folder of images, `camera:N`, a URL, or `wire`: detections that
-            another process publishes, such as the simulator or an estimator of your own.
+        spec: `FILE.npz:CLIP[/ARRAY]`, a video file, a folder of images, `camera:N`, or a URL.
         config: crop, pacing, and what files may lack.
         clock: stamps the frames of cameras.
-        transport: where `wire` listens.
 
     Raises:
         SourceError: one line saying what is wrong with it.
@@ -43,8 +39,6 @@ def open_source(spec: str, config: SourceConfig, clock: Clock, transport: Transp
         crop = (x, y, width, height)
     if not spec:
         raise SourceError(f"no source given: set --source or perception.source.uri to {_FORMS}")
-    if spec == "wire" and transport is not None:
-        return WireSource(transport)
     if (npz := _NPZ.match(spec)) is not None:
         clip = read_clip(Path(npz["file"]), npz["clip"] or "", config)
         return Playback(spec, stills(clip), paced=config.paced)

@@ -3,18 +3,32 @@
 from __future__ import annotations
 
 from collections import deque
+from typing import Protocol
 
 import numpy as np
 
 from bridge.clock import Clock
-from bridge.inbox import Inbox
 from bridge.messages import Keypoints, KeypointStatus
-from bridge.topics import DETECTIONS
-from bridge.transport.interface import Transport
 from perception.sources.frame import Frame
 
-_DEPTH = 16
+DEPTH = 16  # detections an inbox should keep for it
 _LONGEST_WAIT_S = 0.050
+
+
+class Detections(Protocol):
+    """Where the messages come from: an inbox of the topic `detections`."""
+
+    def drain(self, now_ns: int) -> list[Keypoints]:
+        """Return every message since the last call."""
+        ...
+
+    def wait(self, timeout_s: float) -> bool:
+        """Block until a message is waiting; return whether one is."""
+        ...
+
+    def close(self) -> None:
+        """Stop listening."""
+        ...
 
 
 class WireSource:
@@ -24,8 +38,8 @@ class WireSource:
     gives_images = False
     finished = False
 
-    def __init__(self, transport: Transport) -> None:
-        self._inbox: Inbox[Keypoints] = Inbox(transport, DETECTIONS, depth=_DEPTH)
+    def __init__(self, inbox: Detections) -> None:
+        self._inbox = inbox
         self._frames: deque[Frame] = deque()
 
     def next(self, now_ns: int) -> Frame | None:

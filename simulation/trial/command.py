@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Final, NamedTuple
@@ -14,17 +14,12 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from bridge.clock import NS, SystemClock
+from bridge.clock import NS
 from bridge.config.load import load_config
-from bridge.config.surefoot import SurefootConfig
 from bridge.errors import SurefootError
-from bridge.launch.launcher import Launcher, Phase, ProcessState
-from bridge.launch.monitor import View
-from bridge.launch.observer import Enough, Observer
+from bridge.launch.observed import observe
 from bridge.launch.rehearse import private_wire
-from bridge.launch.timeline import Recorder, Row
-from bridge.launch.watch import Limits, watch_over
-from bridge.transport.zenoh import ZenohTransport
+from bridge.launch.timeline import Row
 from simulation.trial.figure import Told, draw
 from simulation.trial.outcome import DROP_LIMIT_M, Outcome, outcome_of
 from simulation.trial.trace import Trace, load_trace
@@ -33,16 +28,6 @@ WORLD: Final = ('launch.modules.drive="simulation.node"', 'simulation.begins="ar
 TIME_LIMIT_S: Final = 40.0  # no trial takes longer, whatever happens
 FILM_LIMIT_S: Final = 120.0
 WITHOUT_HELP: Final = ("intervention.steps_used=0",)
-
-
-class _UntilOver(Observer):
-    """Watches until the world's process has come to the end of the trial."""
-
-    def show(self, elapsed_s: float, processes: Mapping[str, ProcessState], view: View) -> None:
-        """Print what is due."""
-        super().show(elapsed_s, processes, view)
-        if processes["drive"].phase is Phase.FINISHED:
-            raise Enough
 
 
 class Trial(NamedTuple):
@@ -103,21 +88,13 @@ def _run(
     name: str, out: Path, config: Path | None, overrides: Sequence[str], event_s: float, console: Console
 ) -> Trial:
     """Run one trial and return what became of it."""
-    loaded = load_config(config, overrides)
     trace = out / f"{name}.npz"
     trace.unlink(missing_ok=True)
     options = {"perception": {"source": "wire"}, "drive": {"trace": str(trace)}}
-    recorder = Recorder()
-    transport = ZenohTransport(loaded.bridge, "observer", SystemClock())
-    try:
-        observer = _UntilOver(console, recorder, transport, None)
-        with (
-            _recording(out / f"{name}.mcap", config, overrides),
-            Launcher(loaded, config, overrides, options, out / "logs" / name) as launcher,
-        ):
-            _watch(launcher, loaded, observer)
-    finally:
-        transport.close()
+    with _recording(out / f"{name}.mcap", config, overrides):
+        recorder = observe(
+            config, overrides, options, out / "logs" / name, console, until="drive", limit_s=TIME_LIMIT_S
+        )
     rows = recorder.rows(0.02)
     if not rows or not trace.is_file():
         raise SurefootError(f"demo: the trial ended before anything happened; see {out / 'logs' / name}")
@@ -126,15 +103,6 @@ def _run(
     happened_s = (happened_ns - (recorder.origin_ns or 0)) / NS
     arrest = next((row.reason for row in rows if row.state == "ARREST"), "")
     return Trial(told, rows, happened_s, outcome_of(told, event_s), arrest)
-
-
-def _watch(launcher: Launcher, config: SurefootConfig, observer: Observer) -> None:
-    try:
-        given_up = watch_over(launcher, config, observer, Limits(duration_s=TIME_LIMIT_S))
-    except Enough:
-        return
-    for process in given_up:
-        raise SurefootError(f"{process.role} died with exit code {process.exit_code}: {process.last_line}")
 
 
 @contextmanager

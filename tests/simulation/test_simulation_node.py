@@ -120,7 +120,7 @@ def test_an_option_nobody_knows_is_named() -> None:
 
 def test_perception_takes_detections_from_the_wire() -> None:
     stage = Stage(scenario="walk")
-    source = WireSource(stage.wire)
+    source = WireSource(Inbox(stage.wire, DETECTIONS, depth=64))
     stage.run(0.5)
     frames = [frame for _ in range(30) if (frame := source.next(stage.now_ns)) is not None]
     assert len(frames) == pytest.approx(14, abs=1)
