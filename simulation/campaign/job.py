@@ -69,7 +69,10 @@ def _curves(trace: Trace) -> dict[str, list[float]]:
         "stiffening": trace.stiffening, "state": trace.state,
     }  # fmt: skip
     curves = {name: [round(float(v), 4) for v in column[part]] for name, column in columns.items()}
-    for name, column in (("horizon_s", trace.horizon_s), ("falls_now", trace.falls_now),
-                         ("falls_ahead", trace.falls_ahead), ("distance", trace.distance)):  # fmt: skip
+    heard = {
+        "horizon_s": trace.horizon_s, "unsteady_now": trace.unsteady_now, "falls_now": trace.falls_now,
+        "falls_ahead": trace.falls_ahead, "distance": trace.distance,
+    }  # fmt: skip
+    for name, column in heard.items():
         curves[name] = [round(float(v), 3) for v in column]
     return curves

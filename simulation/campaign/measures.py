@@ -45,9 +45,11 @@ class Measures:
     arrest_s: float  # from the disturbance to the first ARREST after it
     descent_s: float  # from the disturbance to the beginning of the descent
     lead_s: float  # from the first stiffening to the descent
+    unsteady_lead_s: float  # from the first horizon whose present step is not stable to the descent
     seen_lead_s: float  # from the first horizon with a fall in the present step to the descent
     foreseen_lead_s: float  # from the first horizon with a fall in any step to the descent
-    false_foreseen: int  # horizons with a fall in any step before the disturbance
+    false_unsteady: int  # horizons before the disturbance whose present step is not stable
+    false_foreseen: int  # horizons before the disturbance with a fall in any step
     walked_m: float
     rms_force_n: float  # horizontal, in free walking; NaN where nobody walked
     energy_j_m: float  # that the person spends on the walker for a metre of free walking
@@ -96,8 +98,10 @@ def measure(scenario: Scenario, trace: Trace, disturbed_s: float | None, standin
         arrest_s=_first(t, after & (trace.state == ARREST)) - began_s,
         descent_s=descent - began_s,
         lead_s=descent - _stiffened(trace, began_s, descent),
+        unsteady_lead_s=descent - _first(trace.horizon_s, (trace.horizon_s >= began_s) & (trace.unsteady_now >= SEEN)),
         seen_lead_s=descent - _first(trace.horizon_s, (trace.horizon_s >= began_s) & (trace.falls_now >= SEEN)),
         foreseen_lead_s=descent - _first(trace.horizon_s, (trace.horizon_s >= began_s) & (trace.falls_ahead >= SEEN)),
+        false_unsteady=int(np.count_nonzero((trace.horizon_s < began_s) & (trace.unsteady_now >= SEEN))),
         false_foreseen=int(np.count_nonzero((trace.horizon_s < began_s) & (trace.falls_ahead >= SEEN))),
         walked_m=walked,
         rms_force_n=float(np.sqrt(np.mean(horizontal[quiet]))) if free else nan,

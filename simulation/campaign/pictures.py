@@ -79,12 +79,17 @@ def distribution(
 
 def leads(falls: Sequence[dict[str, Any]], arms: Sequence[str]) -> Figure:
     """Return leads as dots, one row for each arm and kind of lead."""
-    figure = Figure(figsize=(8.0, 0.6 + 0.45 * 3 * len(arms)), layout="constrained")
+    figure = Figure(figsize=(8.0, 0.6 + 0.45 * 4 * len(arms)), layout="constrained")
     axes = figure.subplots()
     rows: list[str] = []
     rng = np.random.default_rng(0)
     for arm in arms:
-        for name, what in (("lead_s", "stiff"), ("foreseen_lead_s", "fall foreseen"), ("seen_lead_s", "fall seen")):
+        for name, what in (
+            ("lead_s", "stiff"),
+            ("unsteady_lead_s", "not stable"),
+            ("foreseen_lead_s", "fall foreseen"),
+            ("seen_lead_s", "fall seen"),
+        ):
             values = np.array([r["trials"][arm]["measures"][name] for r in falls])
             values = values[np.isfinite(values)]
             rows.append(f"{arm}: {what} ({len(values)})")

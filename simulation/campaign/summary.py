@@ -70,6 +70,7 @@ def arm_numbers(results: Sequence[dict[str, Any]], arm: str) -> dict[str, Any]:
         "peak_force_median_weights": _percentile(falls, "peak_force_weights", 50),
         "peak_rate_median_n_s": _percentile(falls, "peak_rate_n_s", 50),
         "lead_median_s": _percentile(falls, "lead_s", 50),
+        "unsteady_lead_median_s": _percentile(falls, "unsteady_lead_s", 50),
         "seen_lead_median_s": _percentile(falls, "seen_lead_s", 50),
         "foreseen_lead_median_s": _percentile(falls, "foreseen_lead_s", 50),
         "rms_force_median_n": _percentile(calm, "rms_force_n", 50),

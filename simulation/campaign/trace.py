@@ -29,6 +29,7 @@ class Trace(NamedTuple):
     state: Floats  # index into STATES, UNKNOWN before the first command
     touched: Floats  # 1 from the first contact of pelvis, trunk, head, thigh or knee with the floor on
     horizon_s: Floats  # (H,) when each horizon came
+    unsteady_now: Floats  # (H,) probability of transient and fall together at step 0
     falls_now: Floats  # (H,) probability of fall at step 0
     falls_ahead: Floats  # (H,) its largest value over the horizon
     distance: Floats  # (H,) least distance to the fall boundary over the horizon [within-class sd]
@@ -69,13 +70,14 @@ class Recorder:
 
     def heard(self, now_ns: int, horizon: FallHorizon) -> None:
         """Take a horizon."""
-        fall = horizon.probabilities[:, 2]
+        stable, fall = horizon.probabilities[:, 0], horizon.probabilities[:, 2]
         self._horizons.append((
-            (now_ns - self._start_ns) / NS, float(fall[0]), float(fall.max()), float(horizon.distance.min())
+            (now_ns - self._start_ns) / NS, 1.0 - float(stable[0]), float(fall[0]), float(fall.max()),
+            float(horizon.distance.min()),
         ))  # fmt: skip
 
     def trace(self) -> Trace:
         """Return what was noted."""
         a = np.array(self._rows).T
-        h = np.array(self._horizons).reshape(-1, 4).T
+        h = np.array(self._horizons).reshape(-1, 5).T
         return Trace(a[0], a[1], a[2], a[3], a[4:7].T, *a[7:], *h)

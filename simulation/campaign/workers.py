@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
-from typing import Any
+from typing import Any, Final
 
 import joblib
 
 from bridge.errors import MissingExtraError, SurefootError
+
+CONNECT_S: Final = 10.0  # a scheduler that has not answered by then is not there
 
 
 def work(
@@ -49,7 +51,7 @@ def _connect(address: str) -> Any:
     except ImportError as error:
         raise MissingExtraError("--cluster", "distributed", "cluster") from error
     try:
-        client: Any = Client(address, timeout=10)
+        client: Any = Client(address, timeout=CONNECT_S)
     except (OSError, ValueError, TimeoutError) as error:
         raise SurefootError(f"no Dask scheduler answers at {address}: {error}") from error
     return client

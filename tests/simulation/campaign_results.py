@@ -34,7 +34,8 @@ def trace(drop_m: float, stiff_s: float = np.inf, down_s: float = 1.2, touched: 
     ahead = (heard >= down_s - 0.1).astype(float)
     return Trace(
         t, height, np.gradient(height, t), 0.5 * t, np.stack((zero, zero, -hang), axis=1), zero, zero, zero + 1.0,
-        (t >= stiff_s).astype(float), state, (touched & (t > 1.5)).astype(float), heard, seen, ahead, 3.0 - 4.0 * seen,
+        (t >= stiff_s).astype(float), state, (touched & (t > 1.5)).astype(float), heard, ahead, seen, ahead,
+        3.0 - 4.0 * seen,
     )  # fmt: skip
 
 
@@ -52,8 +53,8 @@ def quick(job: Job) -> dict[str, Any]:
     for arm in job.arms:
         numbers = measured(drop, 1.25 if arm != "none" and job.kind == "fall" else np.inf, kind=job.kind)
         curves = {"time_s": [0.0, 1.0], "pelvis_m": [0.9, 0.8], "column_m": [1.0, 1.0], "force_n": [0.0, 1.0],
-                  "stiffening": [0.0, 1.0], "state": [1.0, 3.0], "horizon_s": [0.5], "falls_now": [0.0],
-                  "falls_ahead": [0.1], "distance": [3.0]}  # fmt: skip
+                  "stiffening": [0.0, 1.0], "state": [1.0, 3.0], "horizon_s": [0.5], "unsteady_now": [0.2],
+                  "falls_now": [0.0], "falls_ahead": [0.1], "distance": [3.0]}  # fmt: skip
         trials[arm] = {"measures": numbers.row(), "failed_checks": [], "curves": curves}
     return {
         "name": job.name,

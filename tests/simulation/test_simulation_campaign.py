@@ -19,6 +19,7 @@ from campaign_results import measured, quick
 from bridge.cli import main
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import ConfigError, SurefootError
+from simulation.campaign import workers
 from simulation.campaign.campaign import Plan, run_campaign
 from simulation.campaign.job import Job
 from simulation.campaign.statistics import percentile, share
@@ -59,6 +60,7 @@ def test_leads_are_positive_before_the_descent(earlier_s: float) -> None:
     m = measured(0.09, stiff_s=1.2 - earlier_s)
     assert m.lead_s == pytest.approx(earlier_s, abs=0.03)
     assert m.foreseen_lead_s == pytest.approx(0.1, abs=0.06)
+    assert m.unsteady_lead_s == m.foreseen_lead_s
     assert m.seen_lead_s == pytest.approx(-0.3, abs=0.06)
     assert m.arrest_s == pytest.approx(0.2 - earlier_s, abs=0.01)
 
@@ -202,10 +204,9 @@ def test_a_cluster_of_two_workers_gives_the_same(tmp_path: Path) -> None:
     assert files(tmp_path / "cluster") == files(tmp_path / "here")
 
 
-def test_a_cluster_that_is_not_there() -> None:
-    from simulation.campaign.workers import work
-
+def test_a_cluster_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(workers, "CONNECT_S", 0.5)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         with pytest.raises(SurefootError, match="no Dask scheduler"):
-            list(work(quick, plan().jobs(), 1, "tcp://127.0.0.1:9"))
+            list(workers.work(quick, plan().jobs(), 1, "tcp://127.0.0.1:9"))
