@@ -85,6 +85,7 @@ def table_3(results: Results, table: str, kind: str, title: str, with_paper: boo
         f"({excluded / max(1, tested + excluded):.1%}) left out"
     )
     why = "without a horizon" if table == "urfd_every_horizon" else "whose window of 15 frames is not whole"
+    why += " or was learnt" if results["protocol"] == "paper" else ""
     return Table(title, _head(results), rows, f"{note} {why}. Mean ± sd over {len(content['parts'])} part(s).")
 
 
