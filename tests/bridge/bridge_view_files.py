@@ -52,9 +52,11 @@ class Rrd:
         self.views: dict[str, str] = {}
         for store in reader.blueprints():
             for chunk in reader.stream(store=store):
-                for row in chunk.to_record_batch().to_pylist():
-                    if "ViewBlueprint:display_name" in row:
-                        self.views[row["ViewBlueprint:display_name"][0]] = row["ViewBlueprint:class_identifier"][0]
+                batch = chunk.to_record_batch()
+                if "ViewBlueprint:display_name" in batch.schema.names:
+                    names = batch.column("ViewBlueprint:display_name").to_pylist()
+                    classes = batch.column("ViewBlueprint:class_identifier").to_pylist()
+                    self.views.update({name[0]: kind[0] for name, kind in zip(names, classes, strict=True)})
 
     def drawn(self, entity: str, component: str) -> list[Row]:
         """Return the rows of an entity that hold `component`."""

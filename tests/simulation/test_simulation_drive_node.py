@@ -94,7 +94,7 @@ def test_stands_until_it_is_told() -> None:
     assert pose.position == pytest.approx([0.0, 0.0, 1.0])
     status = bench.node.status(bench.clock.now_ns())
     assert status.level == 1
-    assert status.summary == "holds: no command received yet"
+    assert status.summary.startswith("holds: no command received yet")
 
 
 def test_expired_commands_brake_the_base_and_hold_the_column() -> None:
