@@ -30,10 +30,10 @@ class SimulationConfig(Section):
     event_s: float = Field(default=8.0, ge=3.0, le=3600)
     """When the disturbance comes, after the beginning [s]."""
 
-    push_impulse_n_s: float = Field(default=60.0, ge=0, le=200)
+    push_impulse_n_s: float = Field(default=110.0, ge=0, le=200)
     """Impulse of the push [N s]; 13.7 to 59.3 N s were recorded on healthy people who did not fall (human-data.csv)."""
 
-    push_direction_deg: float = Field(default=180.0, ge=-360, le=360)
+    push_direction_deg: float = Field(default=0.0, ge=-360, le=360)
     """Direction of the push in the walker's axes: 0 from behind, 90 to the left, 180 from the front [degrees]."""
 
     seed: int = Field(default=0, ge=0)
