@@ -153,7 +153,7 @@ class SimulationNode:
         odometry = self.world.odometry()
         x, y, _ = odometry.position
         points, depth = self._camera.project(self.world.keypoints(), (x, y, odometry.yaw))
-        if self._performance.scenario.faults.blind(self.world.time_s):
+        if self._performance.scenario.faults.blind(self._performance.time_s):
             points = np.full_like(points, np.nan)
         seen = self._detector.observe(points, depth)
         lost = ~np.isfinite(seen.points[:, :2]).all(axis=1)

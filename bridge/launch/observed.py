@@ -1,4 +1,4 @@
-"""The processes run once, watched from the wire until one of them has done its part."""
+"""The processes run once, watched from the wire until they have done their part."""
 
 from __future__ import annotations
 
@@ -20,16 +20,18 @@ from bridge.transport.zenoh import ZenohTransport
 
 
 class _UntilFinished(Observer):
-    """Watches until a role's process has come to its end."""
+    """Watches until a role's process has come to its end, for those whose end does not end a run by itself."""
 
-    def __init__(self, console: Console, recorder: Recorder, transport: Transport, role: str) -> None:
-        super().__init__(console, recorder, transport, None)
+    def __init__(
+        self, console: Console, recorder: Recorder, transport: Transport, seconds: float | None, role: str
+    ) -> None:
+        super().__init__(console, recorder, transport, seconds)
         self._role = role
 
     def show(self, elapsed_s: float, processes: Mapping[str, ProcessState], view: View) -> None:
         """Print what is due."""
         super().show(elapsed_s, processes, view)
-        if processes[self._role].phase is Phase.FINISHED:
+        if self._role and processes[self._role].phase is Phase.FINISHED:
             raise Enough
 
 
@@ -40,10 +42,13 @@ def observe(
     log_dir: Path,
     console: Console,
     *,
-    until: str,
     limit_s: float,
+    until: str = "",
+    seconds: float | None = None,
 ) -> Recorder:
-    """Run `launch.roles` until the process of role `until` finishes; print what happens, return what was on the wire.
+    """Run `launch.roles`, print what happens, return what was on the wire.
+
+    Ends with perception's source, with the process of role `until`, after `seconds` of keypoints, or after `limit_s`.
 
     Raises:
         SurefootError: a process died.
@@ -52,7 +57,7 @@ def observe(
     recorder = Recorder()
     transport = ZenohTransport(loaded.bridge, "observer", SystemClock())
     try:
-        observer = _UntilFinished(console, recorder, transport, until)
+        observer = _UntilFinished(console, recorder, transport, seconds, until)
         with Launcher(loaded, config, overrides, options, log_dir) as launcher:
             try:
                 given_up = watch_over(launcher, loaded, observer, Limits(duration_s=limit_s))

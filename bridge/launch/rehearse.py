@@ -15,19 +15,15 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from bridge.clock import SystemClock
 from bridge.config.load import load_config
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import SourceError, SurefootError, TransportError
 from bridge.launch.command import ControllerKind
-from bridge.launch.launcher import Launcher
-from bridge.launch.observer import Enough, Observer
+from bridge.launch.observed import observe
 from bridge.launch.picture import Labels, Picture, write
 from bridge.launch.ports import require_free
 from bridge.launch.summary import Summary, fall_of, sentences, summarise
 from bridge.launch.timeline import Recorder, Row, to_csv
-from bridge.launch.watch import Limits, watch_over
-from bridge.transport.zenoh import ZenohTransport
 
 CLIP: Final = "walk-stumble-fall"
 ROLES: Final = ("perception", "anticipation", "controller", "drive")
@@ -59,14 +55,7 @@ def rehearse(
         options["controller"] = {"controller": controller.value}
     console = Console(highlight=False, soft_wrap=True)
     console.print(f"[bold]surefoot rehearse[/]  {CLIP}: a generated recording, through the real processes over Zenoh")
-    recorder = Recorder()
-    transport = ZenohTransport(loaded.bridge, "observer", SystemClock())
-    try:
-        shown = Observer(console, recorder, transport, seconds)
-        with Launcher(loaded, config, overrides, options, out / "logs") as launcher:
-            _watch(launcher, loaded, shown)
-    finally:
-        transport.close()
+    recorder = observe(config, overrides, options, out / "logs", console, limit_s=TIME_LIMIT_S, seconds=seconds)
     rows = recorder.rows(TABLE_PERIOD_S)
     if not rows:
         raise SurefootError(f"rehearse: ended before any keypoints came; see {out / 'logs'}")
@@ -78,15 +67,6 @@ def rehearse(
         console.print(sentence)
     console.print(f"[bold]{out / 'timeline.png'}[/]  and the same numbers in {out / 'timeline.csv'}")
     return 0
-
-
-def _watch(launcher: Launcher, config: SurefootConfig, shown: Observer) -> None:
-    try:
-        given_up = watch_over(launcher, config, shown, Limits(duration_s=TIME_LIMIT_S))
-    except Enough:
-        return
-    for process in given_up:
-        raise SurefootError(f"{process.role} died with exit code {process.exit_code}: {process.last_line}")
 
 
 def _recording() -> Path:

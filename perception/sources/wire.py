@@ -62,5 +62,5 @@ class WireSource:
 def _frame(message: Keypoints) -> Frame:
     person = np.column_stack((message.position_px, message.confidence))
     person[message.status == KeypointStatus.LOST] = (np.nan, np.nan, 0.0)
-    people = (person,) if message.people > 0 else ()
+    people = (person,) if message.valid and message.people > 0 else ()
     return Frame(message.stamp_ns, message.image_width, message.image_height, None, people)

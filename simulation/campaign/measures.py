@@ -15,10 +15,9 @@ import numpy as np
 
 from bridge.messages import Floats, GaitState
 from simulation.campaign.trace import STATES, Trace
+from simulation.scenarios.arrest import ALLOWED_DROP_M, TIPPED_RAD
 from simulation.scenarios.scenario import Scenario
 
-ALLOWED_DROP_M: Final = 0.10  # an arrest: Vector Elite's default is 0.101 m
-TIPPED_RAD: Final = 0.17  # ten degrees
 STIFF: Final = 0.2  # stiffening that a person feels
 LOW_M: Final = 0.04  # below walking height: a descent
 COMING_DOWN_M_S: Final = 0.1

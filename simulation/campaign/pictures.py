@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from simulation.campaign.measures import ALLOWED_DROP_M
 from simulation.campaign.statistics import share
+from simulation.scenarios.arrest import ALLOWED_DROP_M
 
 COLOURS: Final = {"none": "#9a9a9a", "reactive": "#d08a2e", "anticipatory": "#2a6fb0"}
 DOTS_PER_INCH: Final = 110

@@ -7,8 +7,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from simulation.campaign.measures import ALLOWED_DROP_M
 from simulation.campaign.statistics import Estimate, percentile, share
+from simulation.scenarios.arrest import ALLOWED_DROP_M
 
 HEAVY_KG: Final = (90.0, 110.0)  # 'a 100 kg person'
 

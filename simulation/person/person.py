@@ -251,7 +251,7 @@ class Person:
         return wanted_pressure(dcm, reference, nominal, 1.0 + self._reflexes.dcm_gain_1_s / self._omega)
 
     def _until_transfer(self) -> float:
-        """Return the time until the load has half gone over to the next foot [s]."""
+        """Return the time until the load is taken to change feet, a little after touchdown [s]."""
         return max(self._step.duration_s - self._time_in_step, 0.0) + self._reflexes.transfer * DOUBLE_SUPPORT_S
 
     def _swing_leg(

@@ -41,12 +41,11 @@ class AtPhase:
         """When the waiting begins [s]."""
         return self.what.at_s
 
-    def ready(self, world: World) -> bool:
-        """Whether the moment has come."""
+    def ready(self, world: World, waited_s: float) -> bool:
+        """Whether the moment has come, after waiting for it for `waited_s`."""
         person = world.person
         done = 0.5 * (person.phase + (0.0 if person.stance == "l" else 1.0))
-        late = world.time_s > self.at_s + self.patience_s
-        return late or 0.0 <= done - self.stride < 0.1
+        return waited_s > self.patience_s or 0.0 <= done - self.stride < 0.1
 
     def act(self, world: World, intent: Intent, since_s: float) -> Intent:
         """Let it happen."""
@@ -124,7 +123,7 @@ class Slip:
 
 @dataclass(frozen=True, slots=True)
 class Faint:
-    """Strength fades within a sixth of a second and stays away."""
+    """Strength fades within a fifth of a second and stays away."""
 
     at_s: float
     fade_s: float = 0.05

@@ -93,7 +93,11 @@ class Performance:
                 intent = wish.intent
         for index, each in enumerate(self.scenario.disturbances):
             began = self._began_s[index]
-            if began is None and now >= each.at_s and (not isinstance(each, AtPhase) or each.ready(self.world)):
+            if (
+                began is None
+                and now >= each.at_s
+                and (not isinstance(each, AtPhase) or each.ready(self.world, now - each.at_s))
+            ):
                 began = self._began_s[index] = now
             if began is not None:
                 intent = each.act(self.world, intent, now - began)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from bridge.config.simulation import SimulationConfig
 from simulation.person.anthropometry import BodySize
 from simulation.person.person import Intent
 from simulation.scenarios.disturbance import Disturbance, Faint, Push, Slip, Trip
 from simulation.scenarios.scenario import Scenario, Wish
 
-START_S = 1.5  # the person stands before walking off
+START_S: Final = 1.5  # the person stands before walking off
+AFTER_EVENT_S: Final = 6.0
 
 
 def scenario_from(config: SimulationConfig) -> Scenario:
@@ -27,6 +30,6 @@ def scenario_from(config: SimulationConfig) -> Scenario:
         size=BodySize(config.person_height_m, config.person_mass_kg),
         wishes=(Wish(START_S, Intent(speed_m_s=config.walking_speed_m_s)),),
         disturbances=happens[config.scenario],
-        duration_s=config.event_s + 6.0,
+        duration_s=config.event_s + AFTER_EVENT_S,
         seed=config.seed,
     )

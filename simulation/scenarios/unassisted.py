@@ -7,7 +7,7 @@ from typing import NamedTuple
 from simulation.person.person import CONTROL_S
 from simulation.scenarios.scenario import Performance, Scenario
 
-DESCENT_M_S = 0.3  # downward speed of the pelvis that is a descent
+DESCENT_M_S = 0.15  # downward speed of the pelvis that is a descent
 REST = (0.0, 0.0, 0.0, 0.0)
 
 
@@ -30,11 +30,10 @@ def unassisted(scenario: Scenario) -> Course:
     for _ in range(round(scenario.duration_s / CONTROL_S)):
         performance.advance(REST)
         vertical = float(world.pelvis_velocity_m_s[2])
-        if vertical > -0.5 * DESCENT_M_S:
+        if vertical > -DESCENT_M_S:
             descent = world.time_s
-        if part := world.touched_down():
+        if world.touched_down():
             began = performance.disturbed_s
-            del part
             if began is None:
                 return Course(True, nothing, nothing, speed)
             return Course(True, descent - began, world.time_s - began, speed)

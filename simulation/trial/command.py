@@ -20,13 +20,16 @@ from bridge.errors import SurefootError
 from bridge.launch.observed import observe
 from bridge.launch.rehearse import private_wire
 from bridge.launch.timeline import Row
+from simulation.scenarios.arrest import ALLOWED_DROP_M
+from simulation.scenarios.single import AFTER_EVENT_S
 from simulation.trial.figure import Told, draw
-from simulation.trial.outcome import DROP_LIMIT_M, Outcome, outcome_of
+from simulation.trial.outcome import Outcome, outcome_of
 from simulation.trial.trace import Trace, load_trace
 
 WORLD: Final = ('launch.modules.drive="simulation.node"', 'simulation.begins="armed"')
-TIME_LIMIT_S: Final = 40.0  # no trial takes longer, whatever happens
+START_LIMIT_S: Final = 30.0  # no trial takes longer than its scenario and this, whatever happens
 FILM_LIMIT_S: Final = 120.0
+RECORDER_STOP_S: Final = 20.0
 WITHOUT_HELP: Final = ("intervention.steps_used=0",)
 
 
@@ -75,7 +78,7 @@ def demo(
         for name, trial in (("with Surefoot", held), ("without intervention", unheld))
     ]
     draw(told, out / "timeline.png")
-    made = ["timeline.png", "held.mcap", "unheld.mcap"]
+    made = ["timeline.png", *(name for name in ("held.mcap", "unheld.mcap") if (out / name).is_file())]
     if film and _film(out, config, overrides, settings.event_s, console):
         made = ["demo.gif", "demo.png", *made]
     console.print()
@@ -88,17 +91,21 @@ def _run(
     name: str, out: Path, config: Path | None, overrides: Sequence[str], event_s: float, console: Console
 ) -> Trial:
     """Run one trial and return what became of it."""
-    trace = out / f"{name}.npz"
-    trace.unlink(missing_ok=True)
+    trace, recording = out / f"{name}.npz", out / f"{name}.mcap"
+    for old in (trace, recording):
+        old.unlink(missing_ok=True)
+    limit_s = event_s + AFTER_EVENT_S + START_LIMIT_S
     options = {"perception": {"source": "wire"}, "drive": {"trace": str(trace)}}
-    with _recording(out / f"{name}.mcap", config, overrides):
-        recorder = observe(
-            config, overrides, options, out / "logs" / name, console, until="drive", limit_s=TIME_LIMIT_S
-        )
+    with _recording(recording, config, overrides):
+        recorder = observe(config, overrides, options, out / "logs" / name, console, until="drive", limit_s=limit_s)
     rows = recorder.rows(0.02)
+    if not recording.is_file():
+        console.print(f"no recording: {recording} could not be written")
     if not rows or not trace.is_file():
         raise SurefootError(f"demo: the trial ended before anything happened; see {out / 'logs' / name}")
     told = load_trace(trace)
+    if told.time_s[-1] <= event_s:
+        raise SurefootError(f"demo: the trial ended before {event_s:g} s; see {out / 'logs' / name}")
     happened_ns = float(np.interp(event_s, told.time_s, told.stamp_ns))
     happened_s = (happened_ns - (recorder.origin_ns or 0)) / NS
     arrest = next((row.reason for row in rows if row.state == "ARREST"), "")
@@ -118,13 +125,17 @@ def _recording(path: Path, config: Path | None, overrides: Sequence[str]) -> Ite
         yield
     finally:
         process.terminate()
-        process.wait(timeout=20)
+        try:
+            process.wait(timeout=RECORDER_STOP_S)
+        except subprocess.TimeoutExpired:
+            process.kill()  # what it has written is readable up to the last second
+            process.wait()
 
 
 def _film(out: Path, config: Path | None, overrides: Sequence[str], event_s: float, console: Console) -> bool:
     """Render the film in a process of its own; return whether there is one now."""
-    del config  # the overrides name everything of [simulation] that a film needs
     words = [str(out / "held.npz"), str(out / "unheld.npz"), str(out), "--event-s", str(event_s)]
+    words += ["--config", str(config)] if config is not None else []
     words += [word for override in overrides for word in ("--set", override)]
     try:
         done = subprocess.run(  # noqa: S603 (our own module)
@@ -144,7 +155,7 @@ def _side_by_side(held: Trial, unheld: Trial) -> Table:
     table = Table("", "with Surefoot", "without")
     lines: tuple[tuple[str, Callable[[Outcome], str]], ...] = (
         ("outcome", lambda o: "held" if o.held else "fell"),
-        (f"pelvis drop in m, limit {DROP_LIMIT_M:.2f}", lambda o: f"{o.drop_m:.2f}"),
+        (f"pelvis drop in m, limit {ALLOWED_DROP_M:.2f}", lambda o: f"{o.drop_m:.2f}"),
         ("peak force at the harness in N", lambda o: f"{o.peak_force_n:.0f}"),
         ("knees or trunk on the floor", lambda o: "yes" if o.touched else "no"),
         ("walker tipped", lambda o: "yes" if o.tipped else "no"),

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from bridge.colours import FAINT, FALL, INK, STABLE, STATE_COLOUR, TRANSIENT
 from bridge.launch.timeline import Row
-from simulation.trial.outcome import DROP_LIMIT_M
+from simulation.scenarios.arrest import ALLOWED_DROP_M
 from simulation.trial.trace import Trace
 
 BEFORE_S: Final = 3.0
@@ -44,7 +44,7 @@ def draw(trials: Sequence[Told], out: Path) -> None:
     grid[1, 0].legend(loc="upper left", fontsize=8)
     grid[2, 0].legend(loc="upper left", fontsize=8)
     for axes in grid[-1]:
-        axes.set_xlabel("time from the push [s]")
+        axes.set_xlabel("time from the disturbance [s]")
     part = out.with_name(out.name + ".part")
     figure.savefig(part, dpi=110, format="png")
     part.replace(out)
@@ -55,7 +55,7 @@ def _one(axes: Any, trial: Told) -> None:
     standing = float(trace.pelvis_m[(since > -BEFORE_S) & (since < 0), 2].mean())
     axes[0].set_title(trial.name, color=INK)
     axes[0].plot(since, trace.pelvis_m[:, 2] - standing, color=INK, label="pelvis")
-    axes[0].axhline(-DROP_LIMIT_M, color=FALL, linestyle="--", linewidth=1, label="arrest limit")
+    axes[0].axhline(-ALLOWED_DROP_M, color=FALL, linestyle="--", linewidth=1, label="arrest limit")
     axes[1].plot(since, -trace.wrench[:, 2], color=INK, label="hanging")
     axes[1].plot(since, np.hypot(trace.wrench[:, 0], trace.wrench[:, 1]), color=FAINT, label="horizontal")
     time_s = np.array([row.time_s for row in trial.rows]) - trial.rows_event_s

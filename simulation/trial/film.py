@@ -114,8 +114,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("out", type=Path, help="folder for demo.gif and demo.png")
     parser.add_argument("--event-s", type=float, required=True)
     parser.add_argument("--set", action="append", default=[], metavar="SECTION.KEY=VALUE")
+    parser.add_argument("--config", type=Path)
     given = parser.parse_args(arguments)
-    config = load_config(None, given.set).simulation
+    config = load_config(given.config, given.set).simulation
     model = Performance(scenario_from(config)).world.model
     try:
         stage = Stage(model)

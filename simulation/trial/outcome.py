@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from simulation.scenarios.arrest import ALLOWED_DROP_M, TIPPED_RAD
 from simulation.trial.trace import Trace
-
-DROP_LIMIT_M: Final = 0.10  # beyond it a fall is not arrested (harness arrest: Vector Elite's default is 0.101 m)
 
 
 class Outcome(NamedTuple):
@@ -22,7 +21,7 @@ class Outcome(NamedTuple):
     @property
     def held(self) -> bool:
         """Whether the fall was arrested."""
-        return self.drop_m <= DROP_LIMIT_M and not self.touched and not self.tipped
+        return self.drop_m <= ALLOWED_DROP_M and not self.touched and not self.tipped
 
 
 def outcome_of(trace: Trace, event_s: float) -> Outcome:
@@ -35,5 +34,5 @@ def outcome_of(trace: Trace, event_s: float) -> Outcome:
         drop_m=standing - float(trace.pelvis_m[after, 2].min()),
         peak_force_n=float(force.max()),
         touched=bool(trace.touched[after].any()),
-        tipped=bool(trace.tilt_rad[after].max() > np.radians(10.0)),
+        tipped=bool(trace.tilt_rad[after].max() > TIPPED_RAD),
     )

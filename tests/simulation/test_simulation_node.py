@@ -1,6 +1,7 @@
 """The world as a process: the topics of a walker and a camera, its own gate, the trial's trace; pictures of it."""
 
 import logging
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,11 @@ from bridge.topics import DETECTIONS, FALL_HORIZON, ODOMETRY, SUPPORT_COMMAND, W
 from bridge.transport.memory import MemoryHub
 from perception.sources.wire import WireSource
 from simulation.node import SimulationNode, create
+from simulation.person.anthropometry import BodySize
+from simulation.person.person import Intent
+from simulation.scenarios.disturbance import AtPhase, Push
+from simulation.scenarios.scenario import Performance, Scenario, Wish
+from simulation.scenarios.single import scenario_from
 from simulation.trial import film
 from simulation.trial.figure import Told, draw
 from simulation.trial.outcome import outcome_of
@@ -135,6 +141,29 @@ def test_perception_takes_detections_from_the_wire() -> None:
     assert source.next(stage.now_ns) is None
 
 
+def test_detections_that_declare_themselves_invalid_show_nobody() -> None:
+    stage = Stage(scenario="walk")
+    source = WireSource(Inbox(stage.wire, DETECTIONS, depth=64))
+    stage.run(0.2)
+    good = stage.detections.drain(stage.now_ns)[0]
+    stage.node._detections.send(replace(good, stamp_ns=stage.now_ns, valid=False, reason="lens cap"))
+    frames = [frame for _ in range(30) if (frame := source.next(stage.now_ns)) is not None]
+    assert [bool(frame.people) for frame in frames] == [*[True] * (len(frames) - 1), False]
+
+
+def test_what_waits_for_the_gait_does_not_count_the_time_before_the_scenario() -> None:
+    late = AtPhase(Push(1.0, 10.0), 0.3, patience_s=0.5)
+    scenario = Scenario("x", "non_fall", "x", BodySize(), (Wish(0.0, Intent()),), disturbances=(late,))
+    performance = Performance(scenario)
+    performance.waiting = True
+    while performance.world.time_s < 3.0:
+        performance.advance((0.0, 0.0, 0.0, 0.0))
+    performance.waiting = False
+    while performance.disturbed_s is None:
+        performance.advance((0.0, 0.0, 0.0, 0.0))
+    assert 1.5 <= performance.disturbed_s <= 1.52, "who stands has no phase that would be waited for: patience ends it"
+
+
 def test_the_person_waits_until_the_walker_follows() -> None:
     stage = Stage(scenario="walk", begins="armed")
     stage.run(3.0)
@@ -200,7 +229,14 @@ def test_without_opengl_the_film_says_so(
     def refuse(*_: object) -> None:
         raise RuntimeError("no EGL device")
 
+    sizes = []
+    monkeypatch.setattr(film, "scenario_from", lambda config: sizes.append(config) or scenario_from(config))
     monkeypatch.setattr(film.mujoco, "Renderer", refuse)
+    tall = tmp_path.parent / "tall.toml"
+    tall.write_text("[simulation]\nperson_height_m = 1.9\n")
+    film.main([str(traced), str(traced), str(tmp_path), "--event-s", "3", "--config", str(tall)])
+    assert sizes[0].person_height_m == 1.9, "the film shows who walked"
+    capsys.readouterr()
     assert film.main([str(traced), str(traced), str(tmp_path), "--event-s", "3"]) == film.NO_PICTURES
     assert "no film: OpenGL cannot be used here (no EGL device)" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
