@@ -185,7 +185,7 @@ def _states(band: Any, clock: np.ndarray, states: list[str]) -> None:
 
 
 def _rendered(axes: Any, clock: np.ndarray, turns: list[Turn]) -> None:
-    """Damping and stiffness forward, and of the column, each over its value in an arrest."""
+    """Damping and stiffness, forward and of the column; the column's over ten."""
     twin = axes.twinx()
     for side, name, colour, unit in ((axes, "damping", VELOCITY, "N s/m"), (twin, "stiffness", FALL, "N/m")):
         values = np.array([getattr(turn, name) for turn in turns])

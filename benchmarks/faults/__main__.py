@@ -1,6 +1,6 @@
 """Faults x streams and faults of processes, on real processes over the real wire.
 
-python -m benchmarks.faults                              # everything: about ten minutes
+python -m benchmarks.faults                              # everything: about six minutes
 python -m benchmarks.faults --only stream=horizon        # the rows of one stream, merged into runs/faults.json
 python -m benchmarks.faults --only fault=garbage --only stream=wrench
 python -m benchmarks.faults --table                      # writes the table into docs/safety.md from what is there

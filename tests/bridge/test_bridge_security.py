@@ -241,6 +241,7 @@ def test_a_flood_on_a_topic(site: Site, who: str, said: str) -> None:
             rates = [float(status.values["rate_hz"]) for status in site.statuses.seen[5:]]
             assert np.median(rates) > 70.0, "the loop turns at its hundred a second, give or take a busy machine"
             states = {status.values["state"] for status in site.statuses.seen}
+            assert "FOLLOW" in states
             assert states <= {"FOLLOW", "RECOVER", "SAFE_STOP"}
         finally:
             attacker.kill()

@@ -100,7 +100,10 @@ def best_in_reach(rows: np.ndarray, high: np.ndarray, last: np.ndarray, given_: 
 @given(st.integers(0, 2**32 - 1), st.sampled_from([0.5, 1.0, 2.0]))
 @settings(deadline=None, max_examples=12 * TIMES)
 def test_tip_over_margin_is_respected_whenever_it_can_be(seed: int, harsh: float) -> None:
-    """Against a linear program: where any acceleration of the base in reach keeps the margin, so does the command."""
+    """Against a linear program: where any acceleration of the base in reach keeps the margin, so does the command.
+
+    Near a speed limit the reach is cut by it, which the linear program does not know: there nothing is claimed.
+    """
     random = np.random.default_rng(seed)
     loop = SHARED_LOOP
     loop.controller.reset()

@@ -161,7 +161,6 @@ def test_a_fault_spoils_what_it_says_it_spoils(fault: StreamFault, topic: Topic)
         whole += fine and out.good
         bad += not fine
         assert not (out.good and not fine), "nothing spoilt passes for good"
-    assert gone + bad + whole <= 59
     assert (whole > 0) == (not fault.stops or fault.name in ("slow", "intermittent"))
     assert (gone + bad > 0) == (fault.name not in ("late", "frozen"))
 

@@ -242,7 +242,7 @@ def test_without_opengl_the_film_says_so(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_whole_stack_holds_who_faints() -> None:
+def test_the_whole_stack_arrests_who_faints() -> None:
     """Perception, anticipation, controller and world in lock-step: the walker arms, follows, and arrests."""
     config = load_config(None, ["simulation.event_s=3"])
     system = LockStep(
@@ -258,12 +258,16 @@ def test_the_whole_stack_holds_who_faints() -> None:
     wire = system.hub.transport()
     commands: Inbox[SupportCommand] = Inbox(wire, SUPPORT_COMMAND, max_age_s=float("inf"))
     horizons = Inbox(wire, FALL_HORIZON, max_age_s=float("inf"))
-    states = []
+    world = next(node for node, _ in system._periodic if isinstance(node, SimulationNode)).world
+    states, heights = [], []
     for tick in range(600):
         system.advance_to(START_NS + tick * TICK_NS)
         message = commands.read(system.clock.now_ns()).message
         states.append(None if message is None else message.state)
+        heights.append(float(world.pelvis_m[2]))
+        assert world.touched_down() == ""
     system.close()
+    assert min(heights) > np.mean(heights[200:300]) - 0.10, "a fall is arrested within ten centimetres"
     assert horizons.read(system.clock.now_ns()).message is not None
     assert states[250] is GaitState.FOLLOW
     assert states[-1] is GaitState.ARREST
