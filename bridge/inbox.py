@@ -76,7 +76,7 @@ class Inbox(Generic[M]):
         self._waiting_others: deque[Sample] = deque(maxlen=depth)
         self._arrived = threading.Event()
         self._message: M | None = None
-        self._source: bytes = b""
+        self._source: bytes | None = None  # None: nobody yet; b"" is a publisher that attaches no name
         self._sequence = -1
         self._stamp_ns = 0
         self._heard_ns = 0  # when the publisher that is followed was last heard, by the reader's clock
@@ -133,8 +133,10 @@ class Inbox(Generic[M]):
     def _take(self, now_ns: int) -> list[M]:
         self._arrived.clear()
         taken: list[M] = []
-        if flood := self._flood.judge(now_ns):
-            self._refusals.note(flood, now_ns / NS)
+        if (flood := self._flood.judge(now_ns)) is not None:
+            if flood:
+                self._refusals.note(flood, now_ns / NS)
+            self._refusals.sweep(now_ns / NS)  # once a second is cheap, and what has stopped is told too
         while sample := self._next():
             if self._is_rivals(sample):
                 self._rival_ns = sample.arrival_ns
@@ -207,7 +209,7 @@ class Inbox(Generic[M]):
 
     def _is_rivals(self, sample: Sample) -> bool:
         """Whether another publisher sent it while the one that is followed lives; then it is not even read."""
-        if sample.source == self._source or not self._source or self.topic.publisher == "*":
+        if sample.source == self._source or self._source is None or self.topic.publisher == "*":
             return False
         return sample.arrival_ns - self._heard_ns <= self.max_age_s * NS
 

@@ -71,11 +71,11 @@ class FloodWatch:
         self._key, self._rate_hz = key, rate_hz
         self._before, self._since_ns = 0, 0
 
-    def judge(self, now_ns: int) -> str:
-        """Return what is wrong with the last second or so; '' for nothing."""
+    def judge(self, now_ns: int) -> str | None:
+        """Return what is wrong with the last second or so, '' for nothing; None while the second is not over."""
         span_s = (now_ns - self._since_ns) * 1e-9
         if span_s < 1.0:
-            return ""
+            return None
         count, known = self.arrived - self._before, self._since_ns > 0
         self._before, self._since_ns = self.arrived, now_ns
         if not known or count <= FLOOD_FACTOR * self._rate_hz * span_s:

@@ -140,6 +140,20 @@ def test_the_other_publisher_takes_over_when_the_first_falls_silent(hub: MemoryH
     assert inbox.rival(clock.advance(1.1)) == ""
 
 
+def test_a_publisher_without_a_name_is_followed_like_any_other(hub: MemoryHub, clock: ManualClock) -> None:
+    """A node of ROS 2 behind a bridge attaches none; whoever attaches one does not displace it by that."""
+    inbox = Inbox[Wrench](hub.transport(), WRENCH)
+    put(inbox, b"", -1, START, x=1)
+    assert force(inbox, START) == 1
+    now = clock.advance(0.01)
+    put(inbox, b"b", 0, now, x=2)
+    assert force(inbox, now) == 1
+    assert inbox.rival(now) == "two publishers of wrench: the first is followed, the other refused"
+    now = clock.advance(0.1)
+    put(inbox, b"b", 1, now, x=2)
+    assert force(inbox, now) == 2, "the first fell silent"
+
+
 def test_a_stamp_from_the_future_is_refused(hub: MemoryHub, clock: ManualClock) -> None:
     inbox, outbox = Inbox[Wrench](hub.transport(), WRENCH), Outbox(hub.transport(), WRENCH)
     outbox.send(wrench(clock.now_ns() + NS))

@@ -62,8 +62,8 @@ def test_a_flood_is_noticed_and_ten_times_the_usual_is_none() -> None:
     watch.arrived += 300
     assert watch.judge(START_NS + NS) == ""
     watch.arrived += 5000
-    assert watch.judge(START_NS + NS + NS // 2) == "", "not before a second is over"
-    assert "a flood, 5000 a second where 30 are usual" in watch.judge(START_NS + 2 * NS)
+    assert watch.judge(START_NS + NS + NS // 2) is None, "not before a second is over"
+    assert "a flood, 5000 a second where 30 are usual" in (watch.judge(START_NS + 2 * NS) or "")
     assert watch.judge(START_NS + 3 * NS) == ""
 
 
@@ -100,6 +100,17 @@ def test_a_replayed_message_is_refused_and_said(reader: Reader) -> None:
     (line,) = reader.said
     assert line == "refused: keypoints: number 7 after 8, an old message or a repeated one"
     assert reader.inbox.refused == 1
+
+
+def test_what_is_no_longer_refused_is_still_counted_in_the_log(reader: Reader) -> None:
+    for _ in range(3):
+        reader.send(keypoints(START_NS), 7)
+    for number in range(9, 16):
+        reader.clock.advance(1.0)
+        assert reader.send(keypoints(reader.clock.now_ns()), number) == ""
+    first, rest = reader.said
+    assert first.startswith("refused: keypoints: number 7 after 8")
+    assert re.fullmatch(r"refused: keypoints: number 7 after 8, .* \(2 times in \d s\)", rest)
 
 
 def test_a_replayed_message_under_another_name_is_refused_and_said(reader: Reader) -> None:
