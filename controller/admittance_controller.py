@@ -118,6 +118,7 @@ class AdmittanceController:
         self._predictive.reset()
         self._motion.rest()
         self._started = False
+        self._stopped = False  # whether the last command was a stop: the column is held, however it sags
         self._last_ns: int | None = None
         self._last_solved_ns = 0
         self._wrench_ns = 0
@@ -130,6 +131,7 @@ class AdmittanceController:
         inputs = self._take(now_ns, odometry, wrench, decision)
         motion = self._motion
         choice = self._choose(now_ns, inputs, decision)
+        self._stopped = choice.solver == "stop"
         before = motion.velocity
 
         def clamp(wanted: Floats) -> Floats:
@@ -175,7 +177,7 @@ class AdmittanceController:
             self._started = True
             self._last_solved_ns = now_ns
         else:
-            self._motion.follow(odometry, span_s, hold_height=decision.stop)
+            self._motion.follow(odometry, span_s, hold_height=decision.stop or self._stopped)
         draw = np.zeros(4) if fault else self._motion.coupling(odometry, self._admittance.mass)
 
         fault = _fault(wrench)

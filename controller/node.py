@@ -106,8 +106,11 @@ class ControllerNode:
         state = GaitState.DISARMED if sent is None else sent.state
         reason = "not started" if sent is None else sent.reason
         rivals = "; ".join(filter(None, (box.rival(now_ns) for box in (self._horizon, self._wrench, self._odometry))))
-        trouble = self._refused_config or (self._mock.fault if self._mock is not None else "") or rivals
-        level = ERROR if self._failure else WARNING if trouble or state in _STOPPED else OK
+        mock_fault = "" if self._mock is None else self._mock.fault
+        off = "no intervention whatever happens: intervention.steps_used = 0"
+        trouble = self._refused_config or mock_fault or rivals or (off if self._thresholds.steps_used == 0 else "")
+        stopped = state in _STOPPED or (sent is not None and sent.solver == "stop")
+        level = ERROR if self._failure else WARNING if trouble or stopped else OK
         values = {
             "rate_hz": f"{self._timing.rate_hz():.1f}",
             **self._timing.error_s.report("period_error"),
@@ -169,6 +172,14 @@ class ControllerNode:
             return
         if isinstance(news, str):
             self._refused_config = f"configuration refused: {news}"
+            self._context.log.error("%s; the old values stay", self._refused_config)
+            return
+        if (news.intervention.steps_used == 0) != (self._thresholds.steps_used == 0):
+            # Who stands in the walker was told whether it would help; a file saved by mistake must not change that.
+            self._refused_config = (
+                f"configuration refused: intervention.steps_used = {news.intervention.steps_used} "
+                f"({self._thresholds.steps_used} in use): to turn intervention off or on takes a restart"
+            )
             self._context.log.error("%s; the old values stay", self._refused_config)
             return
         self._refused_config = ""

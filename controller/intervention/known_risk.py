@@ -35,7 +35,8 @@ class KnownRisk:
 
     def __init__(self, config: InterventionConfig) -> None:
         self._config = config
-        self._horizon: FallHorizon | None = None
+        self._received: FallHorizon | None = None  # whole, for who looks at more of it later
+        self._horizon: FallHorizon | None = None  # as far as it is looked at
         self._risk: Risk | None = None
         self._newest: _Curve | None = None
         self._trusted: _Curve | None = None
@@ -43,11 +44,12 @@ class KnownRisk:
     def reconfigure(self, config: InterventionConfig) -> None:
         """Judge by other thresholds from now on, the newest horizon included."""
         self._config = config
-        if self._horizon is not None and self._newest is not None:
-            self.update(self._horizon, self._newest.start_ns)
+        if self._received is not None and self._newest is not None:
+            self.update(self._received, self._newest.start_ns)
 
     def update(self, horizon: FallHorizon, start_ns: int) -> None:
         """Take a horizon whose step 0 lies at `start_ns` on the reader's clock."""
+        self._received = horizon
         horizon = looked_at(horizon, max(self._config.steps_used, 1))
         self._horizon, self._risk = horizon, assess_risk(horizon, self._config)
         times_s = np.linspace(0.0, (STEPS - 1) * horizon.step_s, STEPS)

@@ -6,7 +6,8 @@ from typing import Any
 
 import casadi as ca
 
-from controller.mpc.structure import Pattern, Structure
+from controller.mpc.structure import Structure
+from controller.mpc.symbols import as_matrix, problem_symbols
 
 _NO_PUSH = 1e-9  # a multiplier this small pushes against nothing
 
@@ -16,17 +17,17 @@ def flaws(structure: Structure) -> Any:
 
     A sum is finite only if every term is; a bound that is not a number is in no order.
     """
-    P, q, A, lower, upper = _problem(structure)
+    P, q, A, lower, upper = problem_symbols(structure)
     crossed = lower.size1() - ca.sum1(lower <= upper)
     return ca.Function("flaws", [P, q, A, lower, upper], [ca.vertcat(ca.sum1(P), ca.sum1(q), ca.sum1(A), crossed)])
 
 
 def residuals(structure: Structure) -> Any:
     """Return `residuals(P, q, A, l, u, x, y) -> (3,)`: feasibility, stationarity, duality gap (`plan.Residuals`)."""
-    P, q, A, lower, upper = _problem(structure)
+    P, q, A, lower, upper = problem_symbols(structure)
     x, y = ca.SX.sym("x", structure.cost.shape[0]), ca.SX.sym("y", structure.constraints.shape[0])
-    matrix = _matrix(structure.constraints, A)
-    curved = ca.triu2symm(_matrix(structure.cost, P)) @ x
+    matrix = as_matrix(structure.constraints, A)
+    curved = ca.triu2symm(as_matrix(structure.cost, P)) @ x
     value = matrix @ x
     pull = curved + q + matrix.T @ y
     primal = ca.fmax(ca.fmax(ca.mmax(lower - value), ca.mmax(value - upper)), 0.0)
@@ -39,15 +40,3 @@ def residuals(structure: Structure) -> Any:
     # A maximum passes over what is not a number; a sum does not.
     whole = ca.sum1(x) + ca.sum1(y)
     return ca.Function("residuals", [P, q, A, lower, upper, x, y], [ca.vertcat(primal, dual, gap, whole)])
-
-
-def _problem(structure: Structure) -> tuple[Any, Any, Any, Any, Any]:
-    n, m = structure.cost.shape[0], structure.constraints.shape[0]
-    sizes = (len(structure.cost.indices), n, len(structure.constraints.indices), m, m)
-    P, q, A, lower, upper = (ca.SX.sym(name, size) for name, size in zip("PqAlu", sizes, strict=True))
-    return P, q, A, lower, upper
-
-
-def _matrix(pattern: Pattern, values: Any) -> Any:
-    sparsity = ca.Sparsity(*pattern.shape, pattern.indptr.tolist(), pattern.indices.tolist())
-    return ca.SX(sparsity, values)

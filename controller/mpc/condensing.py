@@ -27,6 +27,7 @@ from controller.mpc.structure import (
     displacement_index,
     velocity_index,
 )
+from controller.mpc.symbols import as_matrix, problem_symbols
 
 OPEN = 1e30  # what DAQP takes for no bound
 
@@ -183,7 +184,7 @@ def _condense(N: int, limited: tuple[int, ...]) -> Any:
 
 def _reduce(structure: Structure, dynamics: Floats, order: Indices) -> Any:
     N = structure.setting.stages
-    P, q, A, lower, upper = _problem(structure)
+    P, q, A, lower, upper = problem_symbols(structure)
     U = ca.SX.sym("U", N * N, 4)
     free = _free_motion(N, dynamics, lower)
     gradient = _symmetric(structure, P) @ free + q
@@ -193,7 +194,7 @@ def _reduce(structure: Structure, dynamics: Floats, order: Indices) -> Any:
         for axis in range(4)
         for column in range(N)
     ]
-    limited = _matrix(structure.constraints, A) @ free
+    limited = as_matrix(structure.constraints, A) @ free
     rows = [int(row) for row in order]
     low, high = (lower - limited)[rows], (upper - limited)[rows]
     results = [ca.vertcat(*turned), ca.fmax(low, -OPEN), ca.fmin(high, OPEN)]
@@ -202,7 +203,7 @@ def _reduce(structure: Structure, dynamics: Floats, order: Indices) -> Any:
 
 def _expand(structure: Structure, dynamics: Floats, order: Indices) -> Any:
     N = structure.setting.stages
-    P, q, A, lower, _ = _problem(structure)
+    P, q, A, lower, _ = problem_symbols(structure)
     U, z = ca.SX.sym("U", N * N, 4), ca.SX.sym("z", 4 * N)
     multipliers = ca.SX.sym("multipliers", len(order))
     x = _free_motion(N, dynamics, lower)
@@ -219,7 +220,7 @@ def _expand(structure: Structure, dynamics: Floats, order: Indices) -> Any:
     y = ca.SX.zeros(structure.constraints.shape[0])
     y[[int(row) for row in order]] = multipliers
     # What the dynamics' multipliers must be for the gradient to vanish along the states.
-    pull = _symmetric(structure, P) @ x + q + _matrix(structure.constraints, A).T @ y
+    pull = _symmetric(structure, P) @ x + q + as_matrix(structure.constraints, A).T @ y
     for axis in range(4):
         by_v = float(dynamics[axis, 2])
         after_v, after_p = ca.SX(0), ca.SX(0)
@@ -232,25 +233,8 @@ def _expand(structure: Structure, dynamics: Floats, order: Indices) -> Any:
     return ca.Function("expand", [z, multipliers, U, P, q, A, lower], [ca.densify(x), ca.densify(y)])
 
 
-def _problem(structure: Structure) -> tuple[Any, Any, Any, Any, Any]:
-    sizes = {
-        "P": len(structure.cost.indices),
-        "q": structure.cost.shape[0],
-        "A": len(structure.constraints.indices),
-        "lower": structure.constraints.shape[0],
-        "upper": structure.constraints.shape[0],
-    }
-    P, q, A, lower, upper = (ca.SX.sym(name, size) for name, size in sizes.items())
-    return P, q, A, lower, upper
-
-
-def _matrix(pattern: Pattern, values: Any) -> Any:
-    sparsity = ca.Sparsity(*pattern.shape, pattern.indptr.tolist(), pattern.indices.tolist())
-    return ca.SX(sparsity, values)
-
-
 def _symmetric(structure: Structure, P: Any) -> Any:
-    return ca.triu2symm(_matrix(structure.cost, P))
+    return ca.triu2symm(as_matrix(structure.cost, P))
 
 
 def _free_motion(N: int, dynamics: Floats, lower: Any) -> Any:

@@ -17,9 +17,9 @@ Slacks with an exact penalty would allow for it, but a penalty large enough to b
 cost's own scale) takes a solver thousands of iterations. So the bounds themselves are opened, to just what the
 *give-way* motion needs: the acceleration ramped at the largest jerk to the nearest one that drives, floor and
 balance allow (`MachineLimits.give_way`). That is the least violation in reach, what an exact penalty would
-find at infinite weight, and since that motion obeys every row the problem always has a solution. Acceleration and jerk
-are never opened. The motion the plan starts from is the commanded one, which `MotionLimits` keeps viable, so no
-measurement can break velocity or stroke.
+find at infinite weight, and since that motion obeys every row the problem always has a solution. Jerk is never opened,
+acceleration by `_OPENING` at most. The motion the plan starts from is the commanded one, which `MotionLimits` keeps
+viable, so no measurement can break velocity or stroke.
 """
 
 from __future__ import annotations

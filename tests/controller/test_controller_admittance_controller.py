@@ -14,7 +14,6 @@ from bridge.config.walker import WalkerConfig
 from bridge.errors import ConfigError
 from bridge.messages import GaitState, SupportCommand, Wrench
 from controller.admittance_controller import AdmittanceController
-from controller.interface import Controller
 from controller.motion_limits import MotionLimits
 from controller.mpc.plan import Failure
 from controller.walker import Walker
@@ -34,11 +33,6 @@ def push(axis: int, value: float) -> np.ndarray:
 
 def velocities(commands: list[SupportCommand]) -> np.ndarray:
     return np.array([command.velocity for command in commands])
-
-
-def test_it_is_a_controller() -> None:
-    controller: Controller = AdmittanceController(WALKER, ADMITTANCE, MPC)
-    controller.reset()
 
 
 # What is shipped, with a wrench that is expected to fade; only the wall clock decides nothing here.
@@ -312,6 +306,22 @@ class Broken:
 
     def reset(self) -> None:
         self.inner.reset()
+
+
+def test_a_column_that_sags_while_there_is_no_plan_is_held_too() -> None:
+    """A person hangs in the harness, the solver fails for good, the drive gives a little: nothing follows it down."""
+    loop = Loop()
+    broken = Broken(loop.controller._predictive)
+    loop.controller._predictive = broken  # type: ignore[assignment]
+    hanging = [0, 0, -700.0, 0, 0, 0]
+    loop.run(0.5, hanging, 1.0, state=GaitState.ARREST)
+    broken.reason = "the solver reached its iteration limit"
+    commands = loop.run(0.5, hanging, 1.0, state=GaitState.ARREST)
+    assert commands[-1].solver == "stop"
+    held = commands[-1].column_height
+    loop.pose[3] -= 0.01
+    sagged = loop.run(4.0, hanging, 1.0, state=GaitState.ARREST)
+    np.testing.assert_allclose([command.column_height for command in sagged], held, atol=1e-4)
 
 
 @pytest.mark.parametrize("s", [0.0, 0.6])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -209,13 +210,30 @@ def test_a_compiler_that_fails_is_said_and_interpreted(
 def test_code_is_built_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("SUREFOOT_CACHE", str(tmp_path))
     assert called(compiled.compiled([square()])[0]) == [4.0, 9.0]
-    (built,) = tmp_path.iterdir()
+    (built,) = tmp_path.glob("*.so")
     stamp = built.stat().st_mtime_ns
     assert called(compiled.compiled([square()])[0]) == [4.0, 9.0]
     assert built.stat().st_mtime_ns == stamp
 
 
-def test_a_damaged_library_is_said_and_interpreted(
+@pytest.mark.parametrize("left", [0, 100, 4096, None], ids=["empty", "100 bytes", "a page", "no seal"])
+def test_a_library_that_a_power_cut_left_damaged_is_built_again(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, left: int | None
+) -> None:
+    monkeypatch.setenv("SUREFOOT_CACHE", str(tmp_path))
+    text = compiled.source("surefoot_kernels", [square()])
+    path = compiled.library(text, "-O1")
+    assert path is not None
+    whole = path.read_bytes()
+    assert len(whole) > 4096
+    if left is None:
+        path.with_suffix(".sha256").unlink()
+    path.write_bytes(whole[:left])
+    assert called(compiled.compiled([square()])[0]) == [4.0, 9.0]
+    assert path.read_bytes() == whole
+
+
+def test_a_library_that_cannot_be_loaded_is_said_and_interpreted(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, structure: Structure, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setenv("SUREFOOT_CACHE", str(tmp_path))
@@ -223,7 +241,8 @@ def test_a_damaged_library_is_said_and_interpreted(
     loops = resources.files("controller.mpc").joinpath("loops.c").read_text("utf-8")
     for path in (compiled.library(compiled.source("surefoot_kernels", [square()]), "-O1"), compiled.library(loops)):
         assert path is not None
-        path.write_bytes(b"no library")
+        path.write_bytes(b"no library")  # as on a file system that nothing may be executed from
+        path.with_suffix(".sha256").write_text(hashlib.sha256(b"no library").hexdigest())
     assert called(compiled.compiled([square()])[0]) == [4.0, 9.0]
     assert not Workspace(structure).compiled
     assert caplog.text.count("cannot be loaded") == 2

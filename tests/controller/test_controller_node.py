@@ -12,6 +12,7 @@ import pytest
 from controller_messages import MS, NS, command, horizon, odometry, wrench
 
 from bridge.clock import ManualClock
+from bridge.config.intervention import InterventionConfig
 from bridge.config.load import load_config, parse_config
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import ConfigError
@@ -40,6 +41,7 @@ class Pushing:
         self.velocity = np.array([0.5, 0.1, 0.2, 0.0])
         self.error: Exception | None = None
         self.takes_s = 0.001
+        self.solver = "mpc"
         self.resets = 0
         self.steps = 0
 
@@ -57,6 +59,7 @@ class Pushing:
             state=decision.state,
             reason=decision.reason,
             stiffening=decision.stiffening,
+            solver=self.solver,
         )
 
 
@@ -271,6 +274,21 @@ class TestStatus:
         assert status.summary.startswith("SAFE_STOP: wrench is")
         assert float(status.values["age_ms.wrench"]) > 250
 
+    def test_who_does_not_intervene_says_so(self) -> None:
+        bench = Bench(config=SurefootConfig(intervention=InterventionConfig(steps_used=0)))
+        bench.run(1.0)
+        status = bench.node.status(bench.clock.now_ns())
+        assert status.level == 1
+        assert "no intervention whatever happens" in status.summary
+
+    def test_a_controller_that_stops_while_following_is_a_warning(self) -> None:
+        bench = Bench()
+        bench.run(1.0)
+        assert bench.node.status(bench.clock.now_ns()).level == 0
+        bench.controller.solver = "stop"
+        assert bench.run(0.1).state is GaitState.FOLLOW
+        assert bench.node.status(bench.clock.now_ns()).level == 1
+
     def test_is_never_finished(self) -> None:
         assert not Bench().node.finished()
 
@@ -343,6 +361,19 @@ class TestReload:
         self.change(bench, file, "[intervention]\nunknown_risk = 0.4\n")
         bench.run(0.1)
         assert bench.node.status(bench.clock.now_ns()).values["config"] == "in use"
+
+    @pytest.mark.parametrize(("before", "after"), [(16, 0), (0, 16)])
+    def test_intervention_is_not_turned_off_or_on_while_somebody_walks(
+        self, tmp_path: Path, before: int, after: int
+    ) -> None:
+        bench, file = self.bench(tmp_path, f"[intervention]\nsteps_used = {before}\n")
+        self.change(bench, file, f"[intervention]\nsteps_used = {after}\n")
+        bench.person = {"distance": -3.0, "fall": 0.9}
+        out = bench.run(0.5)
+        assert (out.state is GaitState.ARREST) == (before > 0)
+        status = bench.node.status(bench.clock.now_ns())
+        assert f"steps_used = {after} ({before} in use)" in status.summary
+        assert "restart" in status.summary
 
     def test_other_sections_wait_for_a_restart(self, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
         bench, file = self.bench(tmp_path)

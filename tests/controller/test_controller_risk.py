@@ -245,3 +245,11 @@ class TestKnownRisk:
         before = known.ahead(NS, NOW)[0]
         known.reconfigure(InterventionConfig(probability_onset=0.1, probability_full=0.5))
         assert before < known.ahead(NS, NOW)[0] == 1.0
+
+    def test_who_looks_further_ahead_sees_what_was_there_all_along(self) -> None:
+        known = self.make(steps_used=1)
+        known.update(horizon(fall=np.linspace(0.0, 1.0, STEPS)), NS)
+        end = np.array([(STEPS - 1) * STEP_S])
+        assert known.ahead(NS, end)[0] == 0.0
+        known.reconfigure(CONFIG)
+        assert known.ahead(NS, end)[0] == 1.0
