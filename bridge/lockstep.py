@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
-from importlib import import_module
 from typing import Final
 
 from bridge.clock import ManualClock, nanoseconds
 from bridge.config.surefoot import SurefootConfig
 from bridge.node import Factory, Node, NodeContext
+from bridge.plugin import load_module
 from bridge.topics import Topic
 from bridge.transport.interface import Sample
 from bridge.transport.memory import MemoryHub
@@ -23,8 +23,8 @@ NO_LIMIT_S: Final = 1e10  # what solvers take for no limit
 
 
 def load_factory(module: str) -> Factory:
-    """Return the `create` function of a node module named by string."""
-    factory: Factory = import_module(module).create
+    """Return the `create` function of a node's module or file named by string."""
+    factory: Factory = load_module(module).create
     return factory
 
 
@@ -58,7 +58,7 @@ class LockStep:
                 self.hub.transport(),
                 self.clock,
                 logging.getLogger(f"lockstep.{role}"),
-                options,
+                {**config.launch.options_of(role), **options},
             )
             node = (load_factory(module) if isinstance(module, str) else module)(context)
             if node.period_s is None:

@@ -36,7 +36,7 @@ class NodeContext(NamedTuple):
     transport: Transport
     clock: Clock
     log: logging.Logger
-    options: Mapping[str, str]  # of this role alone, from the command line; they win over the config
+    options: Mapping[str, str]  # of this role alone, `launch.options` and the command line; they win over the config
     config_path: Path | None = None  # for parts that reload while running
     overrides: tuple[str, ...] = ()
 
@@ -92,9 +92,10 @@ def main(role: str, factory: Factory, arguments: Sequence[str] | None = None, pr
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format=f"%(asctime)s {role} %(levelname)s %(message)s")
     try:
         stop = _StopFlag()
-        options = _options(parsed.option)
+        given = _options(parsed.option)
         path = Path(parsed.config) if parsed.config else None
         config = load_config(path, parsed.set)
+        options = {**config.launch.options_of(role), **given}
         clock = SystemClock()
         log = logging.getLogger(role)
         with ExitStack() as stack:

@@ -23,7 +23,12 @@ class LaunchConfig(Section):
     """Roles started on this machine, in this order; leave out those that run elsewhere."""
 
     modules: dict[str, str] = Field(default_factory=lambda: dict(DEFAULT_MODULES))
-    """Python module that runs each role (`python -m MODULE`); name your own to replace one, the rest keep theirs."""
+    """Python module (`python -m MODULE`) or file (`lab/drive.py`, from the working directory) that runs each role; name
+    your own to replace one, the rest keep theirs."""
+
+    options: dict[str, dict[str, str | bool | int | float]] = Field(default_factory=dict)
+    """What each role is given as `--option NAME=VALUE`, such as { drive = { port = "/dev/ttyUSB0" } }: a place for
+    the settings of your own nodes."""
 
     restart: bool = True
     """Start a process again when it died."""
@@ -57,4 +62,15 @@ class LaunchConfig(Section):
                 raise ValueError(f"roles names '{role}' more than once")
             if role not in self.modules:
                 raise ValueError(f"roles names '{role}', but modules.{role} is not set")
+        for role in self.options:
+            if role not in self.modules:
+                raise ValueError(f"options names '{role}', which is no role; known: {', '.join(self.modules)}")
         return self
+
+    def options_of(self, role: str) -> dict[str, str]:
+        """Return the options of `role` as a command line would give them."""
+        return {name: _text(value) for name, value in self.options.get(role, {}).items()}
+
+
+def _text(value: str | float) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -69,6 +69,28 @@ def test_refusal_is_not_restarted_and_says_why(stage: Stage) -> None:
     assert state.last_line == "surefoot drive: x.npz: no such source"
 
 
+@pytest.mark.parametrize(
+    ("module", "words"),
+    [
+        ("my_drvie", "surefoot launch.modules: no module 'my_drvie': install it, put its folder on PYTHONPATH"),
+        ("lab/my_drive.py", "surefoot launch.modules: no such file: lab/my_drive.py"),
+    ],
+)
+def test_a_node_that_is_not_there_is_named(stage: Stage, module: str, words: str) -> None:
+    with drive_only(stage, "", f'launch.modules.drive="{module}"') as launcher:
+        launcher.start()
+        wait_until(reach(launcher, Phase.REFUSED), "refused")
+        assert launcher.poll()["drive"].last_line.startswith(words)
+
+
+def test_a_node_may_be_a_file_and_has_its_options_from_the_configuration(stage: Stage) -> None:
+    file = stage.folder / "toy_drive.py"
+    overrides = ('launch.roles=["drive"]', f'launch.modules.drive="{file}"', 'launch.options.drive.source="turns:2"')
+    with Launcher(load_config(stage.config, overrides), stage.config, overrides) as launcher:
+        launcher.start()
+        wait_until(reach(launcher, Phase.FINISHED), "finished")
+
+
 @pytest.mark.parametrize(("override", "restarts"), [("launch.restart=false", 0), ("launch.restart_limit=1", 1)])
 def test_restarts_have_a_limit(stage: Stage, override: str, restarts: int) -> None:
     with drive_only(stage, "crash", override) as launcher:
