@@ -1,0 +1,1 @@
+"""`surefoot tune`: thresholds of `[intervention]` against recorded falls and recorded daily life."""
