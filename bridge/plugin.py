@@ -20,7 +20,7 @@ from typing import Any, Final, NamedTuple
 
 from bridge.errors import ConfigError, SurefootError
 
-_PLUGIN: Final = re.compile(r"^(?P<place>.+\.py|[A-Za-z_]\w*(\.[A-Za-z_]\w*)*):(?P<name>[A-Za-z_]\w*)$")
+_PLUGIN: Final = re.compile(r"^(?!.*\.npz:)(?P<place>.+\.py|[A-Za-z_]\w*(\.[A-Za-z_]\w*)*):(?P<name>[A-Za-z_]\w*)$")
 
 
 class Plugin(NamedTuple):

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import logging
+from typing import Final
 
 import numpy as np
 
 from bridge.clock import NS, Clock, nanoseconds
 from bridge.config.perception import PerceptionConfig
-from bridge.errors import SurefootError
+from bridge.errors import ConfigError, SurefootError
 from bridge.inbox import Inbox
 from bridge.messages import Floats, Keypoints, KeypointStatus, NodeStatus
 from bridge.node import NodeContext, main
 from bridge.outbox import Outbox
+from bridge.plugin import parse_plugin
 from bridge.timing import RecentRate
 from bridge.topics import DETECTIONS, KEYPOINTS
 from perception.estimators.interface import PoseEstimator, load_estimator
@@ -22,6 +24,7 @@ from perception.sources.open import open_source
 from perception.sources.picture import parse_crop
 from perception.sources.wire import DEPTH, WireSource
 
+_OPTIONS: Final = ("source", "crop", "estimator")
 _MOST_FRAMES_A_STEP = 8  # so that a fast source cannot keep the loop from its status and its signals
 _STALL_REPEAT_S = 0.1
 
@@ -155,6 +158,7 @@ def create(context: NodeContext) -> PerceptionNode:
     """Build the node; the options `source`, `crop` and `estimator` win over the config.
 
     Raises:
+        ConfigError: an option that nobody reads, or code of one's own that is not there.
         SourceError: source, crop or estimator cannot be used; one line says why.
         MissingExtraError: an optional package is not installed.
     """
@@ -164,17 +168,25 @@ def create(context: NodeContext) -> PerceptionNode:
         source_config = source_config.model_copy(update={"crop_px": parse_crop(context.options["crop"])})
     name = context.options.get("estimator") or config.estimator
     uri = context.options.get("source") or source_config.uri
+    _require_known(context, uri, name)
     source: Source = (
         WireSource(Inbox(context.transport, DETECTIONS, depth=DEPTH))
         if uri == "wire"
-        else open_source(uri, source_config, context.clock)
+        else open_source(uri, source_config, context.clock, context.options)
     )
     try:
-        estimator = load_estimator(name, config) if source.gives_images else None
+        estimator = load_estimator(name, config, context.options) if source.gives_images else None
     except SurefootError:
         source.close()
         raise
     return PerceptionNode(source, estimator, config, Outbox(context.transport, KEYPOINTS), context.clock, context.log)
+
+
+def _require_known(context: NodeContext, *named: str) -> None:
+    """Raise unless every option is known; where code of one's own is `named`, it is the one to know."""
+    unknown = [option for option in context.options if option not in _OPTIONS]
+    if unknown and not any(parse_plugin(name) for name in named):
+        raise ConfigError(f"perception option {unknown[0]}: known: {', '.join(_OPTIONS)}")
 
 
 if __name__ == "__main__":

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import Field, field_validator
 
 from bridge.config.section import Section
+from bridge.plugin import parse_plugin
 
 
 class BodyScaleConfig(Section):
@@ -58,7 +57,8 @@ class SourceConfig(Section):
     """`[perception.source]`: what the keypoints are made from."""
 
     uri: str = ""
-    """`FILE.npz:CLIP[/ARRAY]`, a video file, a folder of images, `camera:N`, a URL or `wire`; "" = not set."""
+    """`FILE.npz:CLIP[/ARRAY]`, a video file, a folder of images, `camera:N`, a URL, `wire`, or code of your own as
+    `module:name` or `file.py:name`; "" = not set."""
     crop_px: tuple[int, ...] = ()
     """Part of each image that is used: x, y, width, height; [] = the whole image."""
     paced: bool = True
@@ -105,8 +105,8 @@ class YoloConfig(Section):
 class PerceptionConfig(Section):
     """`[perception]`: camera, video or recording in, twelve clean keypoints out."""
 
-    estimator: Literal["movenet", "yolo"] = "movenet"
-    """Pose estimator for sources of images."""
+    estimator: str = "movenet"
+    """Pose estimator for sources of images: movenet, yolo, or code of your own as `module:name` or `file.py:name`."""
     stall_s: float = Field(default=0.2, gt=0, le=10)
     """After this long without a frame the source is said to have stalled."""
     source: SourceConfig = SourceConfig()
@@ -119,3 +119,10 @@ class PerceptionConfig(Section):
     """MoveNet SinglePose through LiteRT."""
     yolo: YoloConfig = YoloConfig()
     """YOLOv8-Pose as ONNX."""
+
+    @field_validator("estimator")
+    @classmethod
+    def _check_estimator(cls, name: str) -> str:
+        if name not in {"movenet", "yolo"} and parse_plugin(name) is None:
+            raise ValueError("expected movenet, yolo, or code of your own as module:name or file.py:name")
+        return name

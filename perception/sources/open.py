@@ -3,34 +3,42 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 from bridge.clock import Clock
 from bridge.config.perception import SourceConfig
 from bridge.errors import SourceError
+from bridge.plugin import parse_plugin
 from perception.sources.camera import open_camera
 from perception.sources.frame import Source
 from perception.sources.image_folder import open_folder
 from perception.sources.keypoint_file import read_clip, stills
+from perception.sources.own import open_own
 from perception.sources.playback import Playback
 from perception.sources.video_file import open_video
 
 _NPZ = re.compile(r"^(?P<file>.+\.npz)(?::(?P<clip>.*))?$")
 _CAMERA = re.compile(r"^camera:(?P<number>\d+)$")
 _URL = re.compile(r"^(https?|rtsps?|rtmp|udp|tcp)://")
-_FORMS = "FILE.npz:CLIP[/ARRAY], a video file, a folder of images, camera:N, a URL or wire"
+_FORMS = (
+    "FILE.npz:CLIP[/ARRAY], a video file, a folder of images, camera:N, a URL, wire, "
+    "or code of your own as module:name or file.py:name"
+)
 
 
-def open_source(spec: str, config: SourceConfig, clock: Clock) -> Source:
+def open_source(spec: str, config: SourceConfig, clock: Clock, options: Mapping[str, str] | None = None) -> Source:
     """Open the source that `spec` names.
 
     Args:
-        spec: `FILE.npz:CLIP[/ARRAY]`, a video file, a folder of images, `camera:N`, or a URL.
+        spec: `FILE.npz:CLIP[/ARRAY]`, a video file, a folder of images, `camera:N`, a URL, or `module:name`.
         config: crop, pacing, and what files may lack.
         clock: stamps the frames of cameras.
+        options: of the role, for a source of one's own.
 
     Raises:
         SourceError: one line saying what is wrong with it.
+        ConfigError: a source of one's own is not there.
         MissingExtraError: images are to be read and OpenCV is not installed.
     """
     crop = None
@@ -46,6 +54,10 @@ def open_source(spec: str, config: SourceConfig, clock: Clock) -> Source:
         return open_camera(int(camera["number"]), crop, clock)
     if _URL.match(spec):
         return open_camera(spec, crop, clock)
+    if (plugin := parse_plugin(spec)) is not None and plugin.place != "camera":
+        if crop is not None:
+            raise SourceError(f"source '{spec}': a crop is not applied to a source of your own; cut its images there")
+        return open_own(plugin, spec, clock, options or {})
     path = Path(spec)
     if path.is_dir():
         return Playback(spec, open_folder(path, crop, config.fps_hz), paced=config.paced)

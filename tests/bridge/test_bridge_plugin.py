@@ -48,7 +48,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("/abs/x.py:_f", Plugin("/abs/x.py", "_f")),
         *(
             (text, None)
-            for text in ("camera:0", "rtsp://10.0.0.2/x", "wire", "lab.cameras", "x.py", "")
+            for text in ("camera:0", "clip.npz:walk", "rtsp://10.0.0.2/x", "wire", "lab.cameras", "x.py", "")
         ),
     ],
 )
