@@ -16,7 +16,7 @@ import typer
 from rich.console import Console
 
 from anticipation import checkpoint
-from anticipation.training import production
+from anticipation.training import production, simulated
 from anticipation.training.clips import data_folder, required
 from anticipation.training.corpus import read_corpus
 from anticipation.training.inventory import FILES
@@ -38,6 +38,10 @@ Quick = Annotated[bool, typer.Option("--quick", help="A few small fits, to see t
 Epochs = Annotated[int | None, typer.Option(min=1, max=300, help="Epochs of the shipped classifier.")]
 Folds = Annotated[int, typer.Option(min=2, max=24, help="Folds, divided by recording.")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of folds, draws and weights.")]
+Simulated = Annotated[
+    Path | None,
+    typer.Option("--simulated", help="Folder of `surefoot clips` to learn from too.", show_default=False),
+]
 RunFolder = Annotated[
     Path | None,
     typer.Option("--run-folder", help="Folder of the run's states and log; default: OUT.run.", show_default=False),
@@ -54,6 +58,7 @@ def train(
     data: Data = None,
     out: Annotated[Path, typer.Option(help="Checkpoint to write (.safetensors).")] = Path("surefoot.safetensors"),
     own: Annotated[Path | None, typer.Option("--own", help="Folder of your own recordings to learn from too.")] = None,
+    clips: Simulated = None,
     seed: Seed = 0,
     recipe: Annotated[
         RecipeName, typer.Option(help="Networks and how they learn: the shipped ones, or others.")
@@ -75,7 +80,7 @@ def train(
     After a kill, the same command goes on where the run was, and ends with the very weights it would have had.
 
     Examples: `surefoot train --evaluation runs/evaluation.json --out mine.safetensors`,
-    `surefoot train --own recordings --device cuda`,
+    `surefoot train --own recordings --device cuda`, `surefoot train --simulated runs/clips`,
     `torchrun --nproc-per-node 2 --no-python surefoot train`.
     """
     folder = data_folder(data)
@@ -87,11 +92,12 @@ def train(
     plan = plan_for(recipe, seed, quick, epochs)
     _one_thread()
     with joined(_device(device)) as (team, place):
-        settings = _settings(plan, folds, seed, measured, own, team, place)
+        settings = _settings(plan, folds, seed, measured, own, clips, team, place)
         with closing(Journal(run_folder or Path(f"{out}.run"), settings, team, fresh)) as journal:
             if journal.begun:
                 _console().print(f"going on with the run in {journal.folder}", markup=False)
-            corpus = read_corpus(folder, plan.mocap_clips, seed, CleaningConfig(), _own(own))
+            acted = () if clips is None else simulated.read(clips)
+            corpus = read_corpus(folder, plan.mocap_clips, seed, CleaningConfig(), _own(own), acted)
             with _log(logged, journal, team) as log, progress_bars(team.leads) as progress:
                 run = Run(place, team, journal, log)
                 made = production.make_checkpoint(corpus, plan, folds, seed, measured, progress, run)
@@ -107,6 +113,7 @@ def _settings(
     seed: int,
     measured: Mapping[str, Any] | None,
     own: Path | None,
+    clips: Path | None,
     team: Team,
     device: torch.device,
 ) -> dict[str, Any]:
@@ -117,6 +124,7 @@ def _settings(
         "seed": seed,
         "evaluation": None if measured is None else zlib.crc32(json.dumps(measured, sort_keys=True).encode()),
         "own": None if own is None else str(own.resolve()),
+        "simulated": None if clips is None else str(clips.resolve()),
         "processes": team.size,
         "device": device.type,
         "surefoot": version("surefoot"),

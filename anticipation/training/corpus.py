@@ -10,7 +10,7 @@ from typing import Final, Literal
 import numpy as np
 
 from anticipation.training import mocap, oumvlp, upfall, urfd
-from anticipation.training.clips import UNLABELLED, Clip
+from anticipation.training.clips import STABLE, UNLABELLED, Clip
 from anticipation.training.samples import Samples, Track, clean, cut
 from anticipation.training.splits import Indices, grouped_folds
 from bridge.config.perception import CleaningConfig
@@ -22,6 +22,11 @@ DAILY_STRIDE: Final = 3  # daily activities last a minute: every third window sa
 MOCAP_STRIDE: Final = 2
 OUMVLP_CLIPS: Final = 2000  # sequences of a second taken of each estimator
 OWN_SHARE: Final = 0.2  # of a batch, where there are recordings of the user's own
+SIMULATED_MOTION: Final = 0.25  # beside 1 for all people: of the forecaster's batches, where there are simulated clips
+SIMULATED_EVENT: Final = (
+    0.3  # of the classifier's: windows in which a simulated fall is under way or half a second ahead
+)
+SIMULATED_CALM: Final = 0.2  # and the others
 MOCAP_KEPT: Final = 0.15  # share of the mocap clips that no network learns from
 
 
@@ -35,6 +40,7 @@ class Corpus:
     walks: tuple[Track, ...]  # mocap for training
     kept_walks: tuple[Track, ...]  # mocap for testing
     own: tuple[Track, ...] = ()  # the user's recordings
+    simulated: tuple[Track, ...] = ()  # of people in the simulator's harness
 
     @property
     def people(self) -> tuple[Track, ...]:
@@ -52,8 +58,9 @@ class Shares:
 
 
 def read_corpus(
-    folder: Path, mocap_clips: int, seed: int, cleaning: CleaningConfig, own: tuple[Track, ...] = ()
-) -> Corpus:
+    folder: Path, mocap_clips: int, seed: int, cleaning: CleaningConfig, own: tuple[Track, ...] = (),
+    simulated: Sequence[Clip] = (),
+) -> Corpus:  # fmt: skip
     """Read, clean and sort all recordings; walks of OUMVLP-Pose too, where they are there.
 
     Raises:
@@ -77,6 +84,7 @@ def read_corpus(
         walks=tuple(track for track in walks if track.group not in kept),
         kept_walks=tuple(track for track in walks if track.group in kept),
         own=own,
+        simulated=cleaned(simulated),
     )
 
 
@@ -120,6 +128,12 @@ def shares(corpus: Corpus, chosen: Sequence[Track]) -> Shares:
         (daily, 0.1),
         (walks, 0.05),
     ]
+    if corpus.simulated:  # not divided into folds: what is tested in the simulator is made from other seeds
+        everything = cut(corpus.simulated)
+        motion.append((everything, SIMULATED_MOTION))
+        eventful = ((everything.labels != STABLE) & (everything.labels != UNLABELLED)).any(axis=1)
+        gait.append((everything.take(np.flatnonzero(eventful)), SIMULATED_EVENT))
+        gait.append((_labelled(everything.take(np.flatnonzero(~eventful))), SIMULATED_CALM))
     return Shares(_there(motion), _there(gait), walks)
 
 

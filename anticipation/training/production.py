@@ -65,7 +65,10 @@ def make_checkpoint(
         temperature = np.array(evaluation["temperature"], dtype=np.float64)
     made = fold_checkpoint(corpus, corpus.people, everything, pretrained, plan, seed, "all recordings", progress, run)
     protocol = "not evaluated" if evaluation is None else str(evaluation["protocol"])
-    learnt = (*DATA, *(name for name in ("OUMVLP-Pose", "own") if any(track.source == name for track in _all(corpus))))
+    learnt = (
+        *DATA,
+        *(name for name in ("OUMVLP-Pose", "own", "simulated") if any(track.source == name for track in _all(corpus))),
+    )
     provenance = Provenance(learnt, LICENCE, protocol, {} if evaluation is None else _summary(evaluation))
     return replace(made, temperature=temperature, provenance=provenance)
 
@@ -133,7 +136,7 @@ def _summary(evaluation: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _all(corpus: Corpus) -> tuple[Track, ...]:
-    return corpus.people + corpus.walks
+    return corpus.people + corpus.walks + corpus.simulated
 
 
 def _logits(checkpoint: Checkpoint, samples: Samples) -> NDArray[np.float32]:

@@ -11,6 +11,7 @@ import torch
 import typer
 from rich.console import Console
 
+from anticipation.training import simulated
 from anticipation.training.clips import data_folder
 from anticipation.training.corpus import read_corpus
 from anticipation.training.evaluation import records
@@ -88,6 +89,10 @@ def evaluate(
         list[Path] | None,
         typer.Option("--experiment", metavar="FILE.json", help="Table measured apart, for the page; repeatable."),
     ] = None,
+    clips: Annotated[
+        Path | None,
+        typer.Option("--simulated", help="Folder of `surefoot clips` to learn from too.", show_default=False),
+    ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="A few small fits, to see that everything runs.")] = False,
 ) -> None:
     """Measure how well recordings are foreseen that no network has seen.
@@ -111,7 +116,8 @@ def evaluate(
         def study(seed: int, keypoints: str) -> Study:
             plan = plan_for(recipe, seed, quick, epochs)
             folder = data_folder(data)
-            corpus = read_corpus(folder, plan.mocap_clips, seed, parsed.perception.cleaning)
+            acted = () if clips is None else simulated.read(clips)
+            corpus = read_corpus(folder, plan.mocap_clips, seed, parsed.perception.cleaning, simulated=acted)
             filmed = read_recordings(folder, corpus, plan.mocap_clips, seed)
             return Study(corpus, filmed, plan, seed, place, parsed, progress, keypoints, baselines, live is not False)
 
