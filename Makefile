@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
-.PHONY: demo test lint format bench properties mutate faults fuzz soak clean
+.PHONY: demo test lint format docs pictures bench properties mutate faults fuzz soak clean
 
 demo: $(VENV)/.base
 	$(BIN)/surefoot demo
@@ -32,6 +32,16 @@ format: $(VENV)/.dev
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+# The site, in site/: opens from there without a server, and fetches nothing from elsewhere.
+docs: $(VENV)/.docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	$(BIN)/python docs/generate/outside.py site
+	@echo "site/index.html"
+
+# The pictures of docs/concepts.md, drawn by the code they explain.
+pictures: $(VENV)/.base
+	$(BIN)/python docs/pictures --out docs/images
+
 bench: $(VENV)/.bench
 	$(BIN)/python -m benchmarks.mpc --json runs/bench/mpc.json
 	$(BIN)/python -m benchmarks.anticipation --json runs/bench/anticipation.json
@@ -52,7 +62,7 @@ soak: $(VENV)/.dev
 	$(BIN)/python -m benchmarks.soak --json runs/soak.json
 
 clean:
-	rm -rf $(VENV) runs build *.egg-info
+	rm -rf $(VENV) runs build site *.egg-info
 
 # torch goes first and alone: a CPU build sorts above the plain release of the same number, so it is taken
 # wherever one is offered, and nothing that follows pulls CUDA. The index is asked once, briefly, because pip
@@ -73,6 +83,11 @@ $(VENV)/.base: pyproject.toml constraints.txt
 $(VENV)/.dev: $(VENV)/.base
 	@echo "installing what tests and lint need"
 	@$(PIP) install --quiet -c constraints.txt -e '.[dev]'
+	@touch $@
+
+$(VENV)/.docs: $(VENV)/.base
+	@echo "installing what builds the site"
+	@$(PIP) install --quiet -c constraints.txt -e '.[docs]'
 	@touch $@
 
 $(VENV)/.mutate: $(VENV)/.dev
