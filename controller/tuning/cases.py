@@ -105,7 +105,7 @@ class Case:
     @property
     def times_s(self) -> Floats:
         """When the controller has its turns, (T,) [s] from the start."""
-        times_s: Floats = np.arange(self.ticks) * (self.period_ns / NS)
+        times_s: Floats = np.arange(self.ticks, dtype=np.float64) * (self.period_ns / NS)
         return times_s
 
 

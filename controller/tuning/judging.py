@@ -1,0 +1,75 @@
+"""Which recorded messages an inbox would have taken, which it would have refused, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+from bridge.clock import NS
+from bridge.codec import decode
+from bridge.errors import InvalidMessage
+from bridge.messages import Message
+from bridge.stuck import StuckWatch
+from bridge.topics import Topic
+
+FUTURE_S = 0.050  # as the inbox tolerates it
+
+
+class Judged(NamedTuple):
+    """One message with what an inbox says of it."""
+
+    message: Message
+    arrival_ns: int
+    fault: str  # '' when it may be used
+
+
+class Judge:
+    """Judges one stream in order of arrival, as `bridge.inbox.Inbox` does.
+
+    Left out are messages that an inbox passes over in silence: repeated or overtaken ones, and a second publisher
+    while the first lives. What cannot be decoded has no stamp and is left out too.
+    """
+
+    def __init__(self, topic: Topic, stuck_after_s: float) -> None:
+        self._topic = topic
+        self._stuck = StuckWatch(topic.key, stuck_after_s)
+        self._source: bytes | None = None
+        self._sequence, self._stamp_ns, self._heard_ns = -1, 0, 0
+        self.left_out = 0
+
+    def judge(self, samples: Iterable[Any]) -> list[Judged]:
+        """Return what is left of `samples` (`bridge.transport.interface.Sample`)."""
+        taken: list[Judged] = []
+        for sample in samples:
+            judged = self._one(sample)
+            if judged is None:
+                self.left_out += 1
+            else:
+                taken.append(judged)
+        return taken
+
+    def _one(self, sample: Any) -> Judged | None:
+        other = self._source is not None and sample.source != self._source
+        if other and sample.arrival_ns - self._heard_ns <= self._topic.max_age_s * NS:
+            return None
+        try:
+            message = decode(self._topic, sample.payload, max(sample.sequence, 0))
+        except InvalidMessage:
+            return None
+        numbered = sample.source == self._source and sample.sequence >= 0
+        if not (sample.sequence > self._sequence if numbered else message.stamp_ns > self._stamp_ns):
+            return None
+        fault = ""
+        ahead_s = (message.stamp_ns - sample.arrival_ns) / NS
+        try:
+            if ahead_s > FUTURE_S:
+                raise InvalidMessage(
+                    f"{self._topic.key} is stamped {ahead_s * 1e3:.0f} ms ahead, limit {FUTURE_S * 1e3:.0f}"
+                )
+            message.check()
+            self._stuck.judge(message)
+        except InvalidMessage as error:
+            fault = str(error)
+        self._source, self._sequence = sample.source, sample.sequence
+        self._stamp_ns, self._heard_ns = message.stamp_ns, sample.arrival_ns
+        return Judged(message, sample.arrival_ns, fault)
