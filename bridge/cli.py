@@ -53,6 +53,7 @@ COMMANDS: Final = {
     "campaign": Command(
         "simulation.campaign.command:campaign", "Hundreds of simulated falls: no help, reactive, anticipatory."
     ),
+    "clips": Command("simulation.campaign.clips.command:clips", "Record simulated falls and daily deeds to train on."),
 }
 
 _usage_error = typer.BadParameter.__base__  # typer names only this one of its usage errors
