@@ -33,12 +33,13 @@ class Measured(NamedTuple):
 
 
 class Robot:
-    """Stands in for your motors and sensors: a base and a column that lag, and a person who pushes with 20 N."""
+    """Stands in for your motors and sensors: a base and a column that lag, and a person who pushes with about 20 N."""
 
     def __init__(self, port: str) -> None:
         self.port = port  # open it here; raise bridge.errors.SurefootError("...") if it does not open
         self._model = DriveModel(base_lag_s=0.05, column_lag_s=0.03, column_low_m=0.7, column_high_m=1.2)
         self._state = DriveState(height=1.0)
+        self._noise = np.random.default_rng(1)  # every real sensor has some: the same values for 0.3 s are a fault
 
     def drive(self, forward: float, left: float, yaw_rate: float, column: float) -> None:
         """Send velocities [m/s, m/s, rad/s, m/s]; motors must stop by themselves when this is not called for 100 ms."""
@@ -48,7 +49,8 @@ class Robot:
         """Return the newest readings at once; never wait for a sensor here."""
         s = self._state
         position, velocity = np.array([s.x, s.y, s.height]), np.array([s.forward, s.left, s.column])
-        return Measured(position, s.yaw, velocity, s.yaw_rate, np.array([20.0, 0.0, 0.0]), np.zeros(3))
+        force = self._noise.normal([20.0, 0.0, 0.0], 0.2)
+        return Measured(position, s.yaw, velocity, s.yaw_rate, force, np.zeros(3))
 
 
 class OwnDrive:

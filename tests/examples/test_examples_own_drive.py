@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
+import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from examples_running import REPO, Running
+from test_examples_alarm import horizon
 
 from bridge.clock import NS, ManualClock
 from bridge.config.load import load_config
@@ -17,7 +19,7 @@ from bridge.messages import GaitState, Odometry, SupportCommand, Wrench
 from bridge.node import NodeContext
 from bridge.outbox import Outbox
 from bridge.plugin import load_module
-from bridge.topics import ODOMETRY, SUPPORT_COMMAND, WRENCH
+from bridge.topics import FALL_HORIZON, ODOMETRY, SUPPORT_COMMAND, WRENCH
 from bridge.transport.memory import MemoryHub
 
 FILE = "examples/own_drive.py"
@@ -114,21 +116,19 @@ def test_the_node_is_as_short_as_the_page_says() -> None:
 
 
 @pytest.mark.processes
-def test_surefoot_up_runs_it(tmp_path: Path) -> None:
-    with Running(tmp_path, "drive", "controller", "--set", f"launch.modules.drive={FILE}") as running:
-        commands = Outbox(running.wire, SUPPORT_COMMAND)
+def test_surefoot_up_runs_it_under_its_controller(tmp_path: Path) -> None:
+    """It says what the controller needs before it follows anybody; when the horizon ends, it holds."""
+    options = ("--set", f"launch.modules.drive={FILE}", "--controller", "log")
+    with Running(tmp_path, "controller,drive", "anticipation", *options) as running:
+        horizons = Outbox(running.wire, FALL_HORIZON)
         odometry: Inbox[Odometry] = Inbox(running.wire, ODOMETRY)
-        speed = 0.0
 
-        def drives(now_ns: int, *, tell: bool = True) -> bool:
-            nonlocal speed
-            if tell:
-                commands.send(command(now_ns, 0.4))
-            reading = odometry.read(now_ns)
-            speed = float(reading.message.velocity[0]) if reading.message is not None else 0.0
-            return speed > 0.3
+        def follows(now_ns: int) -> bool:
+            horizons.send(horizon(now_ns, None))
+            time.sleep(0.02)
+            return running.summary("drive") == "follows commands"
 
-        running.until(drives, "it follows")
-        running.until(lambda now_ns: not drives(now_ns, tell=False) and abs(speed) < 1e-3, "it brakes by itself")
-        running.until(lambda _: running.summary("drive").startswith("holds: command expired"), "it says so")
+        running.until(follows, "it follows")
+        assert odometry.read(running.clock.now_ns()).ok
+        running.until(lambda _: running.summary("drive").startswith("holds: fall_horizon is"), "it holds, and says why")
         assert running.stop() == 0, running.said()
