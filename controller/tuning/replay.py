@@ -93,12 +93,12 @@ class _Machine:
         active = intervention.steps_used > 0
         self._load_n = known.load_n if active else np.zeros(case.ticks)
         self._descent_m_s = known.descent_m_s if active else np.zeros(case.ticks)
+        self._prepare()
 
     def run(self) -> Run:
         case, supervisor = self._case, self._supervisor
         state_of, stiffening_of = np.zeros(case.ticks, np.int8), np.zeros(case.ticks)
         transitions: list[Transition] = []
-        eventful = self._next_event().tolist()
         nows, nears, aheads, wanteds = (column.tolist() for column in self._course)
         faulty, loads, descents = (
             self._known.faulty.tolist(), self._load_n.tolist(), self._descent_m_s.tolist(),
@@ -120,28 +120,43 @@ class _Machine:
                 status.state, s, period_s if turn else 0.0, nows[turn], wanteds[turn], loads[turn], fault != ""
             )  # fmt: skip
             state_of[turn], stiffening_of[turn] = number[status.state], s
-            after = turn + 1
-            if s == 0.0 and eventful[turn] > after and status.state is GaitState.FOLLOW:
-                after = eventful[turn]  # nothing holds that could change FOLLOW
-                state_of[turn:after] = FOLLOW
+            after = max(self._next_event(status.state, s, turn), turn + 1)
+            if after > turn + 1:
+                state_of[turn:after], stiffening_of[turn:after] = number[status.state], s
             now_ns += (after - turn) * case.period_ns
             turn = after
         return Run(case, state_of, stiffening_of, self._course.near, self._course.ahead, tuple(transitions))
 
-    def _next_event(self) -> NDArray[np.int64]:
-        """Return for each turn the first one from it on at which somebody in FOLLOW, wholly free, would be noticed."""
-        supervisor, risk = self._supervisor, self._course
-        calm = (
-            ~self._known.faulty
-            & (risk.ahead < supervisor.guard_on)
-            & (risk.near < supervisor.arrest_on)
-            & (risk.wanted == 0.0)
-            & (self._load_n < supervisor.harness_load_arrest_n)
-            & (self._descent_m_s < supervisor.descent_arrest_m_s)
+    def _next_event(self, state: GaitState, s: float, turn: int) -> int:
+        """Return the first turn after this one at which state or stiffening may change; until then nothing can."""
+        if state is GaitState.FOLLOW:
+            return self._noticed[turn] if s == 0.0 else 0
+        if state is GaitState.ARREST:
+            return self._stirred[turn] if s == 1.0 else 0
+        usable = self._usable[turn]
+        if state is GaitState.DISARMED:
+            return usable if s == 0.0 else 0
+        if state is GaitState.SAFE_STOP and s >= self._config.unknown_risk:
+            return usable if self._course.wanted[turn:usable].max(initial=0.0) <= s else 0
+        return 0
+
+    def _prepare(self) -> None:
+        """Find where something happens to who follows wholly free, to who arrests wholly stiff, to who is stopped."""
+        supervisor, risk, faulty = self._supervisor, self._course, self._known.faulty
+        noticed = (
+            faulty
+            | (risk.ahead >= supervisor.guard_on)
+            | (risk.near >= supervisor.arrest_on)
+            | (risk.wanted > 0.0)
+            | (self._load_n >= supervisor.harness_load_arrest_n)
+            | (self._descent_m_s >= supervisor.descent_arrest_m_s)
         )
-        count = self._case.ticks
-        places = np.where(calm, count, np.arange(count))
-        return np.minimum.accumulate(places[::-1])[::-1]
+        settled = (
+            (risk.near < supervisor.arrest_off)
+            & (self._load_n < supervisor.harness_load_release_n)
+            & (self._descent_m_s < supervisor.descent_release_m_s)
+        )
+        self._noticed, self._stirred, self._usable = _next(noticed), _next(faulty | settled), _next(~faulty)
 
     def _stiffen(
         self, state: GaitState, s: float, elapsed_s: float, now: float, wanted: float, load_n: float, faulty: bool
@@ -195,3 +210,9 @@ class _Machine:
         if case.descent is not None and known.odometry is not None and known.odometry.faulty[turn]:
             return known.odometry.fault(case.descent.stream, turn, now_ns, limits.odometry_age_limit_s)
         return known.horizon.fault(case.horizons.stream, turn, now_ns, limits.horizon_age_limit_s)
+
+
+def _next(happens: NDArray[np.bool_]) -> list[int]:
+    """Return for each turn the first one from it on where something `happens`; their number where nothing does."""
+    places = np.where(happens, np.arange(len(happens)), len(happens))
+    return np.minimum.accumulate(places[::-1])[::-1].tolist()  # type: ignore[no-any-return]
