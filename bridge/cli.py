@@ -2,25 +2,27 @@
 
 Commands live in the packages they belong to and are named by strings, so that the
 bridge imports no other package and `surefoot --help` loads no network library.
-A command is a function with typer annotations; the number it returns is the exit code.
-
-Exit codes: 0 done, 1 something died that should have lived, 2 bad input (one line on
-stderr says what), 130 interrupted.
+A command is a function with typer annotations, its options taken from `bridge.command_line.options` where others
+have them too; the number it returns is the exit code (`bridge.exit_codes`).
 """
 
 from __future__ import annotations
 
 import importlib
+import os
+import select
 import sys
+import traceback
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from importlib.metadata import version
 from typing import Annotated, Any, Final, NamedTuple
 
 import typer
 
+from bridge.command_line import completion
 from bridge.errors import SurefootError
-
-INTERRUPTED = 130  # 128 + SIGINT, as shells report it
+from bridge.exit_codes import MEANINGS, ExitCode
 
 
 class Command(NamedTuple):
@@ -60,29 +62,58 @@ _usage_error = typer.BadParameter.__base__  # typer names only this one of its u
 assert _usage_error is not None
 USAGE_ERROR: Final[Any] = _usage_error
 
+EPILOG: Final = "\n\n".join(
+    [
+        "Example: surefoot up --source clip.npz:walk",
+        "The result goes to stdout, everything else to stderr.",
+        "Exit codes:",
+        *(f"**{code.value}** {meaning}" for code, meaning in MEANINGS.items()),
+    ]
+)
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code."""
+    asked = completion.asked_words() if arguments is None else None
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    code: int
     try:
-        result = _app(words)(words, prog_name="surefoot", standalone_mode=False)
+        if asked is not None:
+            print(completion.answer(lambda: _run(asked)), end="")  # noqa: T201 (what the shell asked for)
+            code = ExitCode.DONE
+        else:
+            code = _run(words)
+        sys.stdout.flush()  # a pipe that nobody reads any more is found here, not at the interpreter's end
     except SurefootError as error:
         _say(str(error))
-        return error.exit_code
+        code = error.exit_code
     except USAGE_ERROR as error:
         command = error.ctx.command_path if error.ctx is not None else "surefoot"
         _say(f"{error.format_message()} (see {command} --help)")
-        return SurefootError.exit_code
+        code = ExitCode.BAD_INPUT
     except (KeyboardInterrupt, typer.Abort):
-        return INTERRUPTED
-    return result if isinstance(result, int) else 0
+        code = ExitCode.INTERRUPTED
+    except Exception as error:  # noqa: BLE001 (the last to know: a fault has an exit code of its own)
+        code = ExitCode.READER_GONE if _reader_gone(error) else ExitCode.FAULT
+        if code is ExitCode.FAULT:
+            traceback.print_exc()
+            _say(f"this is a fault of Surefoot, please report it with the lines above: {error}")
+    return code
+
+
+def _run(words: Sequence[str]) -> int:
+    try:
+        result = _app(words)(words, prog_name="surefoot", standalone_mode=False)
+    except SystemExit as end:
+        if isinstance(end.__context__, BrokenPipeError):  # the answer of typer and of rich, who leave stdout quiet
+            return ExitCode.READER_GONE
+        result = end.code
+    return result if isinstance(result, int) else ExitCode.DONE
 
 
 def _app(words: Sequence[str]) -> typer.Typer:
     """Return the application with only the command loaded that `words` ask for."""
-    app = typer.Typer(
-        name="surefoot", add_completion=False, pretty_exceptions_enable=False, rich_markup_mode="markdown"
-    )
+    app = typer.Typer(name="surefoot", pretty_exceptions_enable=False, rich_markup_mode="markdown", epilog=EPILOG)
     app.callback()(_surefoot)
     wanted = next((word for word in words if not word.startswith("-")), None)
     for name, command in COMMANDS.items():
@@ -116,6 +147,21 @@ def _surefoot(
     ] = False,
 ) -> None:
     """Walking assistance that sees a fall coming and is already stiff when it arrives."""
+
+
+def _reader_gone(error: Exception) -> bool:
+    """Whether `error` comes from a stdout that nobody reads any more; if so, nothing is written there again."""
+    if not isinstance(error, BrokenPipeError):
+        return False
+    with suppress(OSError, ValueError):
+        watched = select.poll()
+        watched.register(sys.stdout.fileno(), 0)  # errors alone are told
+        if watched.poll(0):
+            silence = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(silence, sys.stdout.fileno())
+            os.close(silence)
+            return True
+    return False
 
 
 def _say(text: str) -> None:

@@ -1,10 +1,12 @@
 """The error a user sees: one line naming the thing, the value and the limit."""
 
+from bridge.exit_codes import ExitCode
+
 
 class SurefootError(Exception):
     """A bad input or an environment that cannot serve; the CLI prints it on one line and exits with code 2."""
 
-    exit_code = 2
+    exit_code = ExitCode.BAD_INPUT
 
 
 class ConfigError(SurefootError):

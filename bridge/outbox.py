@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bridge.codec import encode, prepare
+from bridge.codec import encode
 from bridge.messages import Message
 from bridge.topics import Topic
 from bridge.transport.interface import Transport
@@ -12,7 +12,6 @@ class Outbox:
     """Numbers, encodes and sends the messages of one topic."""
 
     def __init__(self, transport: Transport, topic: Topic) -> None:
-        prepare(topic)
         self._topic = topic
         self._publisher = transport.publisher(topic)
         self._sequence = 0

@@ -13,7 +13,6 @@ from typing import Annotated, Any
 
 import torch
 import typer
-from rich.console import Console
 
 from anticipation import checkpoint
 from anticipation.training import production, simulated
@@ -28,23 +27,28 @@ from anticipation.training.plan import Plan, RecipeName, plan_for
 from anticipation.training.run import Run
 from anticipation.training.samples import Track
 from anticipation.training.team import Team, joined
+from bridge.command_line.options import DataOption, ForceOption, SeedOption
+from bridge.command_line.output import note, require_writable
 from bridge.config.perception import CleaningConfig
 from bridge.errors import SourceError, SurefootError
 
-Data = Annotated[
-    Path | None, typer.Option("--data", envvar="SUREFOOT_DATA", help="Folder of the research data.", show_default=False)
-]
 Quick = Annotated[bool, typer.Option("--quick", help="A few small fits, to see that everything runs.")]
 Epochs = Annotated[int | None, typer.Option(min=1, max=300, help="Epochs of the shipped classifier.")]
 Folds = Annotated[int, typer.Option(min=2, max=24, help="Folds, divided by recording.")]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of folds, draws and weights.")]
 Simulated = Annotated[
     Path | None,
-    typer.Option("--simulated", help="Folder of `surefoot clips` to learn from too.", show_default=False),
+    typer.Option(
+        "--simulated", metavar="FOLDER", help="Folder of `surefoot clips` to learn from too.", show_default=False
+    ),
 ]
 RunFolder = Annotated[
     Path | None,
-    typer.Option("--run-folder", help="Folder of the run's states and log; default: OUT.run.", show_default=False),
+    typer.Option(
+        "--run-folder",
+        metavar="FOLDER",
+        help="Folder of the run's states and log; default: OUT.run.",
+        show_default=False,
+    ),
 ]
 Logged = Annotated[
     bool | None,
@@ -55,11 +59,16 @@ Logged = Annotated[
 
 
 def train(
-    data: Data = None,
-    out: Annotated[Path, typer.Option(help="Checkpoint to write (.safetensors).")] = Path("surefoot.safetensors"),
-    own: Annotated[Path | None, typer.Option("--own", help="Folder of your own recordings to learn from too.")] = None,
+    data: DataOption = None,
+    own: Annotated[
+        Path | None, typer.Option("--own", metavar="FOLDER", help="Folder of your own recordings to learn from too.")
+    ] = None,
     clips: Simulated = None,
-    seed: Seed = 0,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.safetensors", help="Checkpoint to write.")] = Path(
+        "surefoot.safetensors"
+    ),
+    force: ForceOption = False,
+    seed: SeedOption = 0,
     recipe: Annotated[
         RecipeName, typer.Option(help="Networks and how they learn: the shipped ones, or others.")
     ] = RecipeName.SUREFOOT,
@@ -67,7 +76,11 @@ def train(
     folds: Folds = 5,
     evaluated: Annotated[
         Path | None,
-        typer.Option("--evaluation", help="JSON of `surefoot evaluate`: calibration and metrics for the checkpoint."),
+        typer.Option(
+            "--evaluation",
+            metavar="FILE.json",
+            help="JSON of `surefoot evaluate`: calibration and metrics for the checkpoint.",
+        ),
     ] = None,
     run_folder: RunFolder = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget an unfinished run in that folder.")] = False,
@@ -79,23 +92,27 @@ def train(
 
     After a kill, the same command goes on where the run was, and ends with the very weights it would have had.
 
-    Examples: `surefoot train --evaluation runs/evaluation.json --out mine.safetensors`,
-    `surefoot train --own recordings --device cuda`, `surefoot train --simulated runs/clips`,
-    `torchrun --nproc-per-node 2 --no-python surefoot train`.
+    Example: surefoot train --own recordings --evaluation runs/evaluation.json --out mine.safetensors
+
+    With simulated people: surefoot train --simulated runs/clips
+
+    On several GPUs: torchrun --nproc-per-node 2 --no-python surefoot train --device cuda
     """
     folder = data_folder(data)
     for file in FILES:
         if file.needed:
             required(folder, file.path)
     measured = None if evaluated is None else production.read_evaluation(evaluated)
-    _writable(out)
+    require_writable(out, "--out")
+    if out.exists() and not force:
+        raise SurefootError(f"--out {out}: the name is taken; --force replaces it")
     plan = plan_for(recipe, seed, quick, epochs)
     _one_thread()
     with joined(_device(device)) as (team, place):
         settings = _settings(plan, folds, seed, measured, own, clips, team, place)
         with closing(Journal(run_folder or Path(f"{out}.run"), settings, team, fresh)) as journal:
             if journal.begun:
-                _console().print(f"going on with the run in {journal.folder}", markup=False)
+                note(f"going on with the run in {journal.folder}")
             acted = () if clips is None else simulated.read(clips)
             corpus = read_corpus(folder, plan.mocap_clips, seed, CleaningConfig(), _own(own), acted)
             with _log(logged, journal, team) as log, progress_bars(team.leads) as progress:
@@ -104,7 +121,7 @@ def train(
             if team.leads:
                 checkpoint.save(made, out)
                 journal.finish()
-                Console().print(f"wrote {out} ({out.stat().st_size / 1e6:.1f} MB)")
+                note(f"wrote {out} ({out.stat().st_size / 1e6:.1f} MB)")
 
 
 def _settings(
@@ -167,7 +184,7 @@ def _device(name: str) -> torch.device:
 def _log(wanted: bool | None, journal: Journal, team: Team) -> Iterator[Log | None]:
     """Open the log of the leading process; without TensorBoard, say so, unless nobody wanted it."""
     if wanted is None and not available() and team.leads:
-        _console().print("no log: TensorBoard is not installed (pip install 'surefoot[train]')", markup=False)
+        note("no log: TensorBoard is not installed (pip install 'surefoot[train]')")
     if not team.leads or wanted is False or (wanted is None and not available()):
         yield None
         return
@@ -178,24 +195,6 @@ def _log(wanted: bool | None, journal: Journal, team: Team) -> Iterator[Log | No
         log.close()
 
 
-def _console() -> Console:
-    return Console(stderr=True)
-
-
 def _one_thread() -> None:
     """More threads give other sums, and on a busy machine no speed."""
     torch.set_num_threads(1)
-
-
-def _writable(path: Path) -> None:
-    """Make the folder of an output file, before hours are spent on its content.
-
-    Raises:
-        SurefootError: it cannot be made, or the path is a folder.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SurefootError(f"cannot write '{path}': {error.strerror}") from error
-    if path.is_dir():
-        raise SurefootError(f"cannot write '{path}': it is a folder")

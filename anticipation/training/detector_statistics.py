@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import typer
@@ -16,6 +16,8 @@ from rich.table import Table
 
 from anticipation.training import detector, urfd
 from anticipation.training.clips import FALL, data_folder
+from bridge.command_line.options import DataOption
+from bridge.command_line.output import result_console
 from bridge.messages import KEYPOINTS, Floats
 from perception.skeleton import NAMES
 
@@ -111,6 +113,11 @@ def show(found: Statistics, console: Console) -> None:
     )
 
 
+def plain(found: Statistics) -> dict[str, Any]:
+    """Return what was found by keypoint and by estimator, AlphaPose first, for JSON."""
+    return {"keypoints": list(NAMES), "estimators": ["alphapose", "movenet"], **found._asdict()}
+
+
 def _swapped(first: Floats, other: Floats) -> Floats:
     """Share of exchanged pairs (6,): the two fit better than half as far when left and right of one change places."""
     shares = []
@@ -135,11 +142,9 @@ def _robust(values: Floats) -> Floats:
     return deviation
 
 
-def main(
-    data: Annotated[Path | None, typer.Option("--data", envvar="SUREFOOT_DATA", help="Folder of the data.")] = None,
-) -> None:
+def main(data: DataOption = None) -> None:
     """Measure again what the detector's noise is drawn from."""
-    show(measure(data_folder(data)), Console())
+    show(measure(data_folder(data)), result_console())
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from anticipation.training.corpus import Shares
 from anticipation.training.plan import Plan
 from anticipation.training.run import ALONE, Run
 from anticipation.training.shifted import ShiftedNetwork
+from bridge.command_line.output import progress as bars
 
 
 @contextmanager
@@ -30,7 +31,7 @@ def progress_bars(shown: bool = True) -> Iterator[Progress]:
         TextColumn("{task.fields[loss]}"),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, disable=not shown) as progress:
+    with bars(*columns, transient=False) if shown else Progress(disable=True) as progress:
         yield progress
 
 

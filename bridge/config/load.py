@@ -11,6 +11,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from bridge.config.surefoot import SurefootConfig
+from bridge.config.version import VERSION, hint, migrated, version_of
 from bridge.errors import ConfigError
 
 
@@ -18,37 +19,57 @@ def load_config(path: Path | None, overrides: Sequence[str] = ()) -> SurefootCon
     """Return the configuration in `path`, with `section.key=value` overrides applied on top.
 
     Args:
-        path: TOML file; None means the defaults.
+        path: TOML file; None means the defaults. One of an older version is migrated, and a hint is logged.
         overrides: values are read as TOML, or as plain text where they are not TOML.
 
     Raises:
         ConfigError: names the file, the key, the value and what was expected.
     """
     name = "defaults" if path is None else str(path)
-    table = {} if path is None else _read(path)
+    table = {} if path is None else parse_text(read_text(path), name)
+    version = version_of(table, name) if table else VERSION
+    table, _ = migrated(table, name)
     for override in overrides:
         _apply(table, override)
-    return parse_config(table, name)
+    config = parse_config(table, name)
+    if version < VERSION:
+        hint(path, version)
+    return config
 
 
 def parse_config(table: Mapping[str, Any], name: str) -> SurefootConfig:
-    """Validate an already read table; `name` is what errors call it."""
+    """Validate an already read table of the present version; `name` is what errors call it."""
+    version_of(table, name)
     try:
         return SurefootConfig.model_validate(table)
     except ValidationError as error:
         raise ConfigError(f"{name}: {_explain(error)}") from error
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_text(path: Path) -> str:
+    """Return the text of a configuration file.
+
+    Raises:
+        ConfigError: it is not there, or cannot be read.
+    """
     try:
-        with path.open("rb") as file:
-            return tomllib.load(file)
+        return path.read_text(encoding="utf-8")
     except FileNotFoundError as error:
         raise ConfigError(f"{path}: no such configuration file") from error
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: cannot be read: {error}") from error
+
+
+def parse_text(text: str, name: str) -> dict[str, Any]:
+    """Return the table in `text`.
+
+    Raises:
+        ConfigError: it is no TOML.
+    """
+    try:
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{path}: not valid TOML: {error}") from error
+        raise ConfigError(f"{name}: not valid TOML: {error}") from error
 
 
 def _apply(table: dict[str, Any], override: str) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pydantic import Field
+
 from bridge.config.admittance import AdmittanceConfig
 from bridge.config.anticipation import AnticipationConfig
 from bridge.config.bridge import BridgeConfig
@@ -13,14 +15,19 @@ from bridge.config.intervention import InterventionConfig
 from bridge.config.launch import LaunchConfig
 from bridge.config.mpc import MpcConfig
 from bridge.config.perception import PerceptionConfig
+from bridge.config.personal import PersonalConfig
 from bridge.config.section import Section
 from bridge.config.simulation import SimulationConfig
 from bridge.config.supervisor import SupervisorConfig
+from bridge.config.version import VERSION
 from bridge.config.walker import WalkerConfig
 
 
 class SurefootConfig(Section):
     """Everything `config/surefoot.toml` may say; every section and key is optional."""
+
+    version: int = Field(default=VERSION, ge=VERSION, le=VERSION)
+    """Of this file's keys, not of Surefoot. Leave it: `surefoot config --migrate` brings an old file up to date."""
 
     bridge: BridgeConfig = BridgeConfig()
     """The wire."""
@@ -51,6 +58,9 @@ class SurefootConfig(Section):
 
     admittance: AdmittanceConfig = AdmittanceConfig()
     """What the person feels at the interface."""
+
+    personal: PersonalConfig = PersonalConfig()
+    """What `surefoot personalise` may propose to a person."""
 
     mpc: MpcConfig = MpcConfig()
     """Horizon, weights and solver of the controller."""

@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from bridge.config.surefoot import SurefootConfig
 
 _HEADER = """\
-# Surefoot's configuration: every key with its default. Delete what you do not change.
+# Surefoot's configuration: every key with its default. Delete what you do not change, but for the version.
 # `[intervention]` may be changed while the system runs; everything else takes effect at the next start.
 """
 
@@ -31,19 +31,22 @@ def _table(section: BaseModel, name: str) -> Iterator[str]:
             continue
         for line in textwrap.wrap(" ".join((field.description or "").split()), 110):
             yield f"# {line}\n"
-        yield f"{key} = {_value(value)}\n"
+        yield f"{key} = {render_value(value)}\n"
     for key, child in nested:
         yield f"\n[{key}]\n"
         yield from _table(child, key)
 
 
-def _value(value: Any) -> str:
+def render_value(value: Any) -> str:
+    """Return a value as TOML."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_value(item)}" for key, item in value.items()) + " }" if value else "{}"
+        return (
+            "{ " + ", ".join(f"{key} = {render_value(item)}" for key, item in value.items()) + " }" if value else "{}"
+        )
     if isinstance(value, (tuple, list)):
-        return "[" + ", ".join(_value(item) for item in value) + "]"
+        return "[" + ", ".join(render_value(item) for item in value) + "]"
     return repr(value)

@@ -13,6 +13,7 @@ from cryptography import x509
 from cryptography.exceptions import InvalidSignature
 from cryptography.x509.oid import NameOID
 
+from bridge.keys.authority import Pair
 from bridge.keys.files import (
     AUTHORITY,
     KeysError,
@@ -48,7 +49,7 @@ def load_credentials(folder: Path, identity: str, now: datetime | None = None) -
     """
     now = now or datetime.now(UTC)
     if not folder.is_dir():
-        raise KeysError(f"{folder}: no such folder of keys; surefoot keys init {folder} makes one")
+        raise KeysError(f"{folder}: no such folder of keys; surefoot keys init --keys {folder} makes one")
     require_private(folder)
     authorities = read_certificates(certificate_file(folder, AUTHORITY))
     path = certificate_file(folder, identity)
@@ -62,7 +63,11 @@ def load_credentials(folder: Path, identity: str, now: datetime | None = None) -
     name = common_name(certificate)
     if name != identity:
         raise KeysError(f"{path}: is made out to '{name}', expected '{identity}'")
-    warnings = (_within(path, certificate, now), _within(certificate_file(folder, AUTHORITY), authority, now))
+    renew = f"surefoot keys issue {identity} --renew --keys {folder} makes a new one"
+    warnings = (
+        _within(path, certificate, now, renew),
+        _within(certificate_file(folder, AUTHORITY), authority, now, new_authority(folder)),
+    )
     return Credentials(
         identity,
         certificate_file(folder, AUTHORITY),
@@ -72,6 +77,28 @@ def load_credentials(folder: Path, identity: str, now: datetime | None = None) -
         certificate.not_valid_after_utc,
         tuple(filter(None, warnings)),
     )
+
+
+def signing_pair(folder: Path) -> Pair:
+    """Return the authority's key and the certificate that belongs to it; while it is changed there are two.
+
+    Raises:
+        KeysError: one of them is missing or damaged, no certificate belongs to the key, or it has expired.
+    """
+    key, path = read_key(key_file(folder, AUTHORITY)), certificate_file(folder, AUTHORITY)
+    certificates = read_certificates(path)
+    for certificate in certificates:
+        if certificate.public_key() == key.public_key():
+            _within(path, certificate, datetime.now(UTC), new_authority(folder))
+            return Pair(key, certificate)
+    many = "its certificate does not belong" if len(certificates) == 1 else f"none of {len(certificates)} belongs"
+    raise KeysError(f"{path}: {many} to the key in {key_file(folder, AUTHORITY)}")
+
+
+def new_authority(folder: Path) -> str:
+    """Return what helps when the authority in `folder` has come to its end."""
+    new = f"{folder}-new"
+    return f"surefoot keys init --keys {new} and surefoot keys issue --keys {new} make a new authority and all roles"
 
 
 def common_name(certificate: x509.Certificate) -> str:
@@ -115,14 +142,18 @@ def remaining(certificate: x509.Certificate, now: datetime) -> str:
     return ""
 
 
-def _within(path: Path, certificate: x509.Certificate, now: datetime) -> str:
-    """Return a warning if the certificate expires soon."""
+def _within(path: Path, certificate: x509.Certificate, now: datetime, mending: str) -> str:
+    """Return a warning if the certificate expires soon.
+
+    Raises:
+        KeysError: it has expired, and `mending` says what helps; or it is not valid yet.
+    """
     if now < certificate.not_valid_before_utc:
         begins = f"{certificate.not_valid_before_utc:%Y-%m-%d %H:%M} UTC"
         raise KeysError(f"{path}: is valid from {begins}, and it is {now:%Y-%m-%d %H:%M}: is the clock right?")
     text = remaining(certificate, now)
     if now > certificate.not_valid_after_utc:
-        raise KeysError(f"{path}: {text}; surefoot keys issue --renew makes a new one")
+        raise KeysError(f"{path}: {text}; {mending}")
     return f"{path}: {text}" if text else ""
 
 

@@ -2,34 +2,40 @@
 
 from __future__ import annotations
 
-import json
+import json as json_
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Final, NamedTuple
 
 import typer
+from cryptography import x509
 
+from bridge.command_line import completion
+from bridge.command_line.options import ConfigOption, JsonOption, SetOption
+from bridge.command_line.output import STDOUT, note, require_writable, result, result_text, write_json
 from bridge.config.load import load_config
-from bridge.keys.authority import Pair, create_authority, issue
-from bridge.keys.check import load_credentials, remaining, require_host
+from bridge.config.version import VERSION
+from bridge.exit_codes import ExitCode
+from bridge.keys.authority import create_authority, issue
+from bridge.keys.check import load_credentials, new_authority, remaining, require_host, signing_pair
 from bridge.keys.files import (
     AUTHORITY,
     KeysError,
     certificate_file,
-    key_file,
     make_folder,
     read_certificates,
-    read_key,
+    require_free,
     write,
     write_pair,
 )
 from bridge.keys.identity import IDENTITIES, identity_of
-from bridge.transport.session import zenoh_settings
+from bridge.transport.session import nested, zenoh_settings
 
 FOLDER: Final = Path("keys")
 CONFIG: Final = "bridge.toml"
 _CONFIG_TEXT = """\
 # Every link is mutual TLS, every role may write its own topics alone. Copy into your configuration.
+version = {version}
 [bridge]
 keys = {folder}
 """
@@ -56,14 +62,19 @@ def init(
     """
     make_folder(folder)
     write_pair(folder, AUTHORITY, create_authority(days))
-    write(folder / CONFIG, _CONFIG_TEXT.format(folder=json.dumps(str(folder))).encode(), 0o644)
-    typer.echo(f"{folder}: authority made; next: surefoot keys issue --keys {folder}", err=True)
+    write(folder / CONFIG, _config_text(str(folder)), 0o644)
+    note(f"{folder}: authority made; next: surefoot keys issue --keys {folder}")
 
 
 @keys.command("issue", epilog="Example: surefoot keys issue perception anticipation --host 10.0.0.2 --out keys-camera")
 def issue_(
     roles: Annotated[
-        list[str] | None, typer.Argument(metavar="[ROLE]...", help=f"Of {', '.join(IDENTITIES)}; default: all.")
+        list[str] | None,
+        typer.Argument(
+            metavar="[ROLE]...",
+            autocompletion=completion.identities,
+            help=f"Of {', '.join(IDENTITIES)}; default: all.",
+        ),
     ] = None,
     folder: FolderOption = FOLDER,
     host: Annotated[
@@ -72,7 +83,8 @@ def issue_(
     ] = None,
     days: Annotated[int, typer.Option(min=1, max=3650, help="How long they are valid [days].")] = 365,
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Write them here, with ca.pem, to be taken elsewhere.")
+        Path | None,
+        typer.Option("--out", metavar="FOLDER", help="Write them here, with ca.pem, to be taken elsewhere."),
     ] = None,
     renew: Annotated[bool, typer.Option("--renew", help="Replace what these roles have.")] = False,
 ) -> None:
@@ -80,55 +92,60 @@ def issue_(
     wanted, names = _known(roles or list(IDENTITIES)), host or []
     for name in names:
         require_host(name)
-    authority = Pair(read_key(key_file(folder, AUTHORITY)), read_certificates(certificate_file(folder, AUTHORITY))[0])
-    expired = remaining(authority.certificate, datetime.now(UTC))
-    if expired.startswith("expired"):
-        raise KeysError(f"{certificate_file(folder, AUTHORITY)}: {expired}; surefoot keys init makes a new authority")
+    authority = signing_pair(folder)
     target = out or folder
+    if not renew:
+        for role in wanted:
+            require_free(target, role)
     if out is not None:
         make_folder(out)
         write(certificate_file(out, AUTHORITY), certificate_file(folder, AUTHORITY).read_bytes(), 0o644, replace=True)
-        write(out / CONFIG, _CONFIG_TEXT.format(folder=json.dumps(FOLDER.name)).encode(), 0o644, replace=True)
+        write(out / CONFIG, _config_text(FOLDER.name), 0o644, replace=True)
     for role in wanted:
         write_pair(target, role, issue(authority, role, names, days), replace=renew)
         until = load_credentials(target, role).expires
-        typer.echo(f"{certificate_file(target, role)}: until {until:%Y-%m-%d}", err=True)
+        note(f"{certificate_file(target, role)}: until {until:%Y-%m-%d}")
 
 
-@keys.command(epilog="Example: surefoot keys show --json")
-def show(
-    folder: FolderOption = FOLDER,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON object instead of lines.")] = False,
-) -> int:
+@keys.command(epilog="Example: surefoot keys show --json -")
+def show(folder: FolderOption = FOLDER, json: JsonOption = None) -> int:
     """Say who has a certificate, until when, for which hosts, and what is wrong with it. Exit code 1: something is."""
     if not folder.is_dir():
         raise KeysError(f"{folder}: no such folder of keys; surefoot keys init --keys {folder} makes one")
+    if json is not None:
+        require_writable(json)
     names = sorted(path.stem for path in folder.glob("*.pem"))
     if not names:
         raise KeysError(f"{folder}: holds no certificates; surefoot keys init --keys {folder} makes an authority")
     rows = [_row(folder, name) for name in names]
-    if as_json:
-        typer.echo(json.dumps({"folder": str(folder), "certificates": [row._asdict() for row in rows]}, indent=2))
-    else:
+    if json is not None:
+        write_json(json, {"folder": folder, "certificates": rows})
+    if json != STDOUT:
         for row in rows:
             state = row.trouble or row.warning or "good"
-            typer.echo(f"{row.name:<14} until {row.expires or '-':<10}  {state:<8} {' '.join(row.hosts)}".rstrip())
-    return 1 if any(row.trouble for row in rows) else 0
+            result(f"{row.name:<14} until {row.expires or '-':<10}  {state:<8} {' '.join(row.hosts)}".rstrip())
+    return ExitCode.CHECK_FAILED if any(row.trouble for row in rows) else ExitCode.DONE
 
 
 @keys.command("zenoh", epilog="Example: surefoot keys zenoh router --config keys/bridge.toml > router.json5")
 def zenoh_(
-    role: Annotated[str, typer.Argument(metavar="ROLE", help=f"One of {', '.join(IDENTITIES)}.")],
-    config: Annotated[Path | None, typer.Option(metavar="FILE", help="Configuration; default: the defaults.")] = None,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Override a value; repeatable.")
-    ] = None,
+    role: Annotated[
+        str,
+        typer.Argument(metavar="ROLE", autocompletion=completion.identities, help=f"One of {', '.join(IDENTITIES)}."),
+    ],
+    config: ConfigOption = None,
+    set_: SetOption = None,
 ) -> None:
     """Print the Zenoh configuration with which ROLE opens its session, for zenohd or a bridge to ROS 2."""
     (name,) = _known([role])
     bridge = load_config(config, set_ or []).bridge
-    credentials = load_credentials(Path(bridge.keys), identity_of(name)) if bridge.keys else None
-    typer.echo(json.dumps(zenoh_settings(bridge, name, credentials), indent=2))
+    # absolute, because whoever reads it starts elsewhere
+    credentials = load_credentials(Path(bridge.keys).resolve(), identity_of(name)) if bridge.keys else None
+    result_text(json_.dumps(nested(zenoh_settings(bridge, name, credentials)), indent=2) + "\n")
+
+
+def _config_text(folder: str) -> bytes:
+    return _CONFIG_TEXT.format(version=VERSION, folder=json_.dumps(folder)).encode()
 
 
 def _known(roles: list[str]) -> list[str]:
@@ -151,12 +168,17 @@ class _Row(NamedTuple):
 def _row(folder: Path, name: str) -> _Row:
     try:
         if name == AUTHORITY:
-            certificate = read_certificates(certificate_file(folder, name))[0]
-            said = remaining(certificate, datetime.now(UTC))
-            gone = said.startswith("expired")
-            expires = f"{certificate.not_valid_after_utc:%Y-%m-%d}"
-            return _Row(name, expires, (), "" if gone else said, said if gone else "")
+            return _authority_row(folder, read_certificates(certificate_file(folder, name)))
         found = load_credentials(folder, name)
     except KeysError as error:
         return _Row(name, "", (), "", str(error))
     return _Row(name, f"{found.expires:%Y-%m-%d}", found.hosts, "; ".join(found.warnings), "")
+
+
+def _authority_row(folder: Path, certificates: list[x509.Certificate]) -> _Row:
+    """Say how long the authorities in `ca.pem` are good; there are two while one takes over from the other."""
+    now = datetime.now(UTC)
+    last = max(certificates, key=lambda certificate: certificate.not_valid_after_utc)
+    said = [text for text in (remaining(certificate, now) for certificate in certificates) if text]
+    trouble = f"{remaining(last, now)}; {new_authority(folder)}" if now > last.not_valid_after_utc else ""
+    return _Row(AUTHORITY, f"{last.not_valid_after_utc:%Y-%m-%d}", (), "" if trouble else "; ".join(said), trouble)

@@ -69,14 +69,22 @@ def write_pair(folder: Path, identity: str, pair: Pair, *, replace: bool = False
     Raises:
         KeysError: one of them is there already and `replace` is not set, or it cannot be written.
     """
-    key, certificate = key_file(folder, identity), certificate_file(folder, identity)
     if not replace:
-        for path in (key, certificate):
-            if path.exists() or path.is_symlink():
-                how = "a new authority needs a new folder" if identity == AUTHORITY else "--renew replaces it"
-                raise KeysError(f"{path}: is there already; {how}")
-    write(key, pair.key_pem(), 0o600, replace=replace)
-    write(certificate, pair.certificate_pem(), 0o644, replace=replace)
+        require_free(folder, identity)
+    write(key_file(folder, identity), pair.key_pem(), 0o600, replace=replace)
+    write(certificate_file(folder, identity), pair.certificate_pem(), 0o644, replace=replace)
+
+
+def require_free(folder: Path, identity: str) -> None:
+    """Raise if `identity` has a key or a certificate in `folder`.
+
+    Raises:
+        KeysError: names the file.
+    """
+    for path in (key_file(folder, identity), certificate_file(folder, identity)):
+        if path.exists() or path.is_symlink():
+            how = "a new authority needs a new folder" if identity == AUTHORITY else "--renew replaces it"
+            raise KeysError(f"{path}: is there already; {how}")
 
 
 def write(path: Path, content: bytes, mode: int, *, replace: bool = False) -> None:

@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
-import json
 import os
 import time
-from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from bridge.clock import NS
-from bridge.latency.hops import HOPS, Spread, frame_to_command, hops, shares
+from bridge.command_line.options import ConfigOption, ControllerOption, JsonOption, SetOption
+from bridge.command_line.output import STDOUT, progress, require_writable, result, status, write_json
+from bridge.latency.hops import HOPS, Spread, measured, shares
 from bridge.latency.system import POLL_S, LiveSystem
-from bridge.launch.command import ControllerKind
 
 TARGET_P99_MS: Final = 50.0
 SETTLE_S: Final = 2.0  # the first steps load what the later ones have
 
 
 def latency(
-    seconds: Annotated[float, typer.Option(min=1, metavar="S", help="How long to measure [s].")] = 30.0,
-    json_: Annotated[Path | None, typer.Option("--json", metavar="FILE", help="Write the numbers there too.")] = None,
-    config: Annotated[Path | None, typer.Option(metavar="FILE", help="Configuration; default: the defaults.")] = None,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Override a value; repeatable.")
-    ] = None,
-    controller: Annotated[ControllerKind | None, typer.Option(help="mpc, or log: record what is asked.")] = None,
+    duration: Annotated[float, typer.Option("--duration", min=1, metavar="S", help="How long to measure [s].")] = 30.0,
+    controller: ControllerOption = None,
+    config: ConfigOption = None,
+    set_: SetOption = None,
+    json: JsonOption = None,
 ) -> int:
     """Measure how long a camera frame takes to become a command on the wire, and where the time goes.
 
@@ -37,21 +33,23 @@ def latency(
     processes on ports of their own. For every frame the first command that rests on it counts, as it
     arrives at an observer. Run it on an idle machine.
 
-    Example: surefoot latency --seconds 30 --json runs/latency.json
+    Example: surefoot latency --duration 30 --json runs/latency.json
     """
-    console = Console(stderr=True)
+    if json is not None:
+        require_writable(json)
     kind = None if controller is None else controller.value
-    with LiveSystem(seconds + 60.0, config, set_ or [], kind) as system:
-        with console.status("starting perception, anticipation, controller and drive"):
+    with LiveSystem(duration + 60.0, config, set_ or [], kind) as system:
+        with status("starting perception, anticipation, controller and drive"):
             system.start()
             system.until(_after(SETTLE_S), "settling")
         since_ns = system.commands[-1][0].stamp_ns
-        _measure(system, console, since_ns, seconds)
+        _measure(system, since_ns, duration)
         heard, load = system.heard_since(since_ns), os.getloadavg()[0]
-    total, parts = frame_to_command(heard), hops(heard)
-    _show(total, parts, load)
-    if json_ is not None:
-        _write(json_, _plain(total, parts, seconds, load))
+    total, parts = measured(heard)
+    if json is not None:
+        write_json(json, _plain(total, parts, duration, load))
+    if json != STDOUT:
+        _show(total, parts, load)
     return 0
 
 
@@ -60,14 +58,13 @@ def _after(span_s: float) -> Any:
     return lambda: time.monotonic() > end_s
 
 
-def _measure(system: LiveSystem, console: Console, since_ns: int, seconds: float) -> None:
-    columns = (TextColumn("measuring"), BarColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("", total=seconds)
+def _measure(system: LiveSystem, since_ns: int, seconds: float) -> None:
+    with progress(TextColumn("measuring"), BarColumn(), TimeRemainingColumn()) as bar:
+        task = bar.add_task("", total=seconds)
 
         def over() -> bool:
             passed_s = (system.commands[-1][0].stamp_ns - since_ns) / NS
-            progress.update(task, completed=passed_s)
+            bar.update(task, completed=passed_s)
             return passed_s > seconds
 
         system.until(over, "measuring", seconds + 60.0 + POLL_S)
@@ -82,10 +79,8 @@ def _show(total: Spread, parts: dict[str, Spread], load: float) -> None:
         table.add_row(HOPS[name], f"{part.p50:.2f}", f"{part.p99:.2f}", f"{part.max:.2f}", f"{share[name]:.0%}")
     table.add_section()
     table.add_row("frame -> command", f"{total.p50:.2f}", f"{total.p99:.2f}", f"{total.max:.2f}", "", style="bold")
-    console = Console()
-    console.print(table)
     verdict = "met" if total.p99 <= TARGET_P99_MS else "missed"
-    console.print(f"{total.frames} frames, load {load:.1f}; target p99 <= {TARGET_P99_MS:g} ms: {verdict}")
+    result(table, f"{total.frames} frames, load {load:.1f}; target p99 <= {TARGET_P99_MS:g} ms: {verdict}")
 
 
 def _plain(total: Spread, parts: dict[str, Spread], seconds: float, load: float) -> dict[str, Any]:
@@ -96,10 +91,3 @@ def _plain(total: Spread, parts: dict[str, Spread], seconds: float, load: float)
         "seconds": seconds,
         "machine": {"cores": os.cpu_count(), "load_1min": round(load, 2)},
     }
-
-
-def _write(file: Path, result: dict[str, Any]) -> None:
-    file.parent.mkdir(parents=True, exist_ok=True)
-    beside = file.with_name(file.name + ".tmp")
-    beside.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
-    beside.replace(file)

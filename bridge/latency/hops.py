@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from bridge.errors import SurefootError
 from bridge.messages import FallHorizon, Keypoints, SupportCommand
 
 MS: Final = 1e6  # nanoseconds in one
@@ -81,6 +82,28 @@ def hops(heard: Heard) -> dict[str, Spread]:
         rows.append(tuple((b - a) / MS for a, b in pairwise(moments)))
     columns: Sequence[Iterable[float]] = list(zip(*rows, strict=True)) if rows else [()] * len(HOPS)
     return dict(zip(HOPS, map(spread, columns), strict=True))
+
+
+def measured(heard: Heard) -> tuple[Spread, dict[str, Spread]]:
+    """Return what `frame_to_command` and `hops` say of `heard`.
+
+    Raises:
+        SurefootError: there is not one frame to speak of; says what was heard and what was not.
+    """
+    total, parts = frame_to_command(heard), hops(heard)
+    if not total.frames:
+        rest = sum(command.rests_on_ns > 0 for command, _ in heard.commands)
+        raise SurefootError(
+            f"nothing to measure: {len(heard.keypoints)} keypoints, {len(heard.horizons)} horizons and"
+            f" {len(heard.commands)} commands came, {rest} of these rest on a frame; it takes commands on two frames"
+        )
+    if not all(part.frames for part in parts.values()):
+        raise SurefootError(
+            f"nothing to measure: of {total.frames} frames that became commands the observer missed every one's"
+            f" keypoints or horizon ({len(heard.keypoints)} keypoints, {len(heard.horizons)} horizons came):"
+            " the machine is too busy"
+        )
+    return total, parts
 
 
 def shares(spreads: Mapping[str, Spread]) -> dict[str, float]:

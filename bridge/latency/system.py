@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final, Self
@@ -17,23 +15,22 @@ from bridge.clock import SystemClock
 from bridge.config.load import load_config
 from bridge.errors import SurefootError
 from bridge.latency.hops import Heard
+from bridge.launch.clip import CLIP, shipped_recording
 from bridge.launch.launcher import Launcher, ProcessState
 from bridge.launch.monitor import Monitor, View
 from bridge.launch.observer import Tap
-from bridge.launch.ports import free_ports
+from bridge.launch.private import private_wire
 from bridge.messages import FallHorizon, Keypoints, SupportCommand
 from bridge.topics import FALL_HORIZON, KEYPOINTS, SUPPORT_COMMAND
 from bridge.transport.zenoh import ZenohTransport
 
 ROLES: Final = ("perception", "anticipation", "controller", "drive")
-CLIP: Final = "walk-stumble-fall"
 POLL_S: Final = 0.005
 
 
 def write_walk(path: Path, seconds: float) -> None:
     """Write `path` with the clip `walk`: the shipped recording's first five seconds, forward and backward again."""
-    recording = Path(str(resources.files("simulation"))) / "demo" / f"{CLIP}.npz"
-    with np.load(recording) as arrays:
+    with np.load(shipped_recording()) as arrays:
         walk = arrays[f"{CLIP}/keypoints"][:150]
         fps, size = float(arrays[f"{CLIP}/fps"]), arrays[f"{CLIP}/image_size"]
     there_and_back = np.concatenate([walk, walk[-2:0:-1]])
@@ -64,9 +61,7 @@ class LiveSystem:
         self._stack = ExitStack()
         folder = Path(self._stack.enter_context(TemporaryDirectory(prefix="surefoot-latency-")))
         write_walk(folder / "walk.npz", seconds)
-        ports = zip(ROLES, free_ports(len(ROLES)), strict=True)
-        own = [f"bridge.endpoints.{role}=tcp/127.0.0.1:{port}" for role, port in ports]
-        everything = [f"bridge.namespace=latency-{os.getpid()}", *own, *overrides]
+        everything = [*overrides, *private_wire(config, overrides, ROLES, "latency"), f"launch.roles={list(ROLES)}"]
         loaded = load_config(config, everything)
         transport = ZenohTransport(loaded.bridge, "observer", SystemClock())
         self._stack.callback(transport.close)

@@ -5,11 +5,14 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Mapping
-from typing import Protocol, Self
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Protocol, Self, TextIO
 
-from rich.console import Console
 from rich.live import Live
 
+from bridge.command_line.output import STDOUT, require_writable, result_console
+from bridge.errors import SurefootError
 from bridge.launch import screen
 from bridge.launch.launcher import ProcessState
 from bridge.launch.monitor import View
@@ -42,7 +45,7 @@ class Screen:
     """A table that is drawn over itself."""
 
     def __init__(self) -> None:
-        self._live = Live(console=Console(), auto_refresh=False)
+        self._live = Live(console=result_console(), auto_refresh=False)
         self._due_s = 0.0
         self._notice = ""
 
@@ -65,10 +68,9 @@ class Screen:
 
 
 class Lines:
-    """One line a second, of text or of JSON."""
+    """One line of text a second."""
 
-    def __init__(self, *, as_json: bool) -> None:
-        self._as_json = as_json
+    def __init__(self) -> None:
         self._due_s = 0.0
 
     def __enter__(self) -> Self:
@@ -79,19 +81,79 @@ class Lines:
 
     def show(self, elapsed_s: float, processes: Mapping[str, ProcessState], view: View) -> None:
         """Print a line when it is due."""
-        if elapsed_s < self._due_s:
-            return
-        self._due_s = elapsed_s + LINE_PERIOD_S
-        if self._as_json:
-            self._print(json.dumps(screen.record(elapsed_s, processes, view)))
-        else:
-            self._print(screen.line(elapsed_s, processes, view))
+        if elapsed_s >= self._due_s:
+            self._due_s = elapsed_s + LINE_PERIOD_S
+            _write(sys.stdout, screen.line(elapsed_s, processes, view))
 
     def say(self, elapsed_s: float, text: str) -> None:
-        """Print `text`; as JSON it is the record's `event`."""
+        """Print `text`."""
         self._due_s = elapsed_s
-        record = {"elapsed_s": round(elapsed_s, 3), "event": text}
-        self._print(json.dumps(record) if self._as_json else f"{elapsed_s:6.1f} s  {text}")
+        _write(sys.stdout, f"{elapsed_s:6.1f} s  {text}")
 
-    def _print(self, text: str) -> None:
-        print(text, file=sys.stdout, flush=True)  # noqa: T201 (what the user asked for)
+
+class JsonLines:
+    """One JSON record a second and one for each event, one a line; `-` is stdout."""
+
+    def __init__(self, file: Path) -> None:
+        """Prepare, but write nothing.
+
+        Raises:
+            SurefootError: the file cannot be written.
+        """
+        require_writable(file)
+        self._file, self._due_s = file, 0.0
+        self._stream: TextIO = sys.stdout
+
+    def __enter__(self) -> Self:
+        if self._file != STDOUT:
+            try:
+                self._stream = self._file.open("w", encoding="utf-8")
+            except OSError as error:
+                raise SurefootError(f"--json {self._file}: cannot be written: {error.strerror}") from error
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._file != STDOUT:
+            self._stream.close()
+
+    def show(self, elapsed_s: float, processes: Mapping[str, ProcessState], view: View) -> None:
+        """Write a record when it is due."""
+        if elapsed_s >= self._due_s:
+            self._due_s = elapsed_s + LINE_PERIOD_S
+            _write(self._stream, json.dumps(screen.record(elapsed_s, processes, view)))
+
+    def say(self, elapsed_s: float, text: str) -> None:
+        """Write `text` as the record's `event`."""
+        self._due_s = elapsed_s
+        _write(self._stream, json.dumps({"elapsed_s": round(elapsed_s, 3), "event": text}))
+
+
+class Several:
+    """Displays side by side."""
+
+    def __init__(self, *displays: Display) -> None:
+        self._displays = displays
+        self._stack = ExitStack()
+
+    def __enter__(self) -> Self:
+        for display in self._displays:
+            self._stack.enter_context(display)
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._stack.close()
+
+    def show(self, elapsed_s: float, processes: Mapping[str, ProcessState], view: View) -> None:
+        """Let each of them show the state."""
+        for display in self._displays:
+            display.show(elapsed_s, processes, view)
+
+    def say(self, elapsed_s: float, text: str) -> None:
+        """Let each of them tell it."""
+        for display in self._displays:
+            display.say(elapsed_s, text)
+
+
+def _write(stream: TextIO, line: str) -> None:
+    stream.write(f"{line}\n")
+    stream.flush()

@@ -3,82 +3,77 @@
 from __future__ import annotations
 
 import importlib
-import os
-import socket
 from collections.abc import Sequence
-from contextlib import closing
-from importlib import resources
 from pathlib import Path
 from typing import Annotated, Final
 
 import numpy as np
 import typer
-from rich.console import Console
 
+from bridge.command_line.options import ConfigOption, ControllerOption, DurationOption, JsonOption, SetOption
+from bridge.command_line.output import STDOUT, note, note_console, require_writable, result, write_json
 from bridge.config.load import load_config
 from bridge.config.surefoot import SurefootConfig
-from bridge.errors import SourceError, SurefootError, TransportError
-from bridge.launch.command import ControllerKind
+from bridge.errors import SurefootError
+from bridge.latency.hops import spread
+from bridge.launch.clip import CLIP, shipped_recording
 from bridge.launch.observed import observe
 from bridge.launch.picture import Labels, Picture, write
-from bridge.launch.ports import require_free
+from bridge.launch.private import private_wire
 from bridge.launch.summary import Summary, fall_of, sentences, summarise
 from bridge.launch.timeline import Recorder, Row, to_csv
 
-CLIP: Final = "walk-stumble-fall"
 ROLES: Final = ("perception", "anticipation", "controller", "drive")
 TABLE_PERIOD_S: Final = 0.02  # of the columns in file and picture
 TIME_LIMIT_S: Final = 55.0  # it never takes longer, whatever happens
 
 
 def rehearse(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where timeline.png and timeline.csv go.")] = Path(
-        "runs/rehearse"
-    ),
-    config: Annotated[Path | None, typer.Option(metavar="FILE", help="Configuration; default: the defaults.")] = None,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Override a value; repeatable.")
-    ] = None,
-    controller: Annotated[ControllerKind | None, typer.Option(help="mpc, or log: record what is asked.")] = None,
-    seconds: Annotated[float | None, typer.Option(min=1, metavar="S", help="Stop after this long [s].")] = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FOLDER", help="Where timeline.png and timeline.csv go.")
+    ] = Path("runs/rehearse"),
+    controller: ControllerOption = None,
+    duration: DurationOption = None,
+    config: ConfigOption = None,
+    set_: SetOption = None,
+    json: JsonOption = None,
 ) -> int:
     """Run perception, anticipation, controller and drive on a generated walk, stumble and fall.
 
-    Prints a line every half second and at each change of state, then a summary; writes
+    Says on stderr how things are every half second and at each change of state, prints a summary, and writes
     timeline.png and timeline.csv. Ends by itself. Exit code 2: a process refused to start or died.
+
+    Example: surefoot rehearse --controller log --out runs/rehearse
     """
-    recording = _recording()
-    overrides = [*(set_ or []), *private_wire(config, set_ or [])]
+    if json is not None:
+        require_writable(json)
+    recording = shipped_recording()
+    overrides = [
+        *(set_ or []),
+        *private_wire(config, set_ or [], ROLES, "rehearsal"),
+        "launch.restart=false",
+        f"launch.roles={list(ROLES)}",
+    ]
     loaded = load_config(config, overrides)
     options: dict[str, dict[str, str]] = {"perception": {"source": f"{recording}:{CLIP}"}}
     if controller is not None:
         options["controller"] = {"controller": controller.value}
-    console = Console(highlight=False, soft_wrap=True)
+    console = note_console()
     console.print(f"[bold]surefoot rehearse[/]  {CLIP}: a generated recording, through the real processes over Zenoh")
-    recorder = observe(config, overrides, options, out / "logs", console, limit_s=TIME_LIMIT_S, seconds=seconds)
+    recorder = observe(config, overrides, options, out / "logs", console, limit_s=TIME_LIMIT_S, seconds=duration)
     rows = recorder.rows(TABLE_PERIOD_S)
     if not rows:
         raise SurefootError(f"rehearse: ended before any keypoints came; see {out / 'logs'}")
     labels = _labels(recording)
     summary = summarise(rows, *(fall_of(labels.label, labels.time_s)))
     _write(out, loaded, recorder, rows, labels, summary)
-    console.print()
-    for sentence in sentences(summary, recorder.latency_s):
-        console.print(sentence)
-    console.print(f"[bold]{out / 'timeline.png'}[/]  and the same numbers in {out / 'timeline.csv'}")
+    if json is not None:
+        spans_ms = spread(span * 1e3 for span in recorder.latency_s)
+        write_json(json, {**summary._asdict(), "frame_to_command_ms": spans_ms})
+    if json != STDOUT:
+        result(*sentences(summary, recorder.latency_s))
+    note(f"{out / 'timeline.png'}  and the same numbers in {out / 'timeline.csv'}")
     return 0
-
-
-def _recording() -> Path:
-    """Return the keypoint file that ships.
-
-    Raises:
-        SourceError: the installation lacks it.
-    """
-    file = Path(str(resources.files("simulation"))) / "demo" / f"{CLIP}.npz"
-    if not file.is_file():
-        raise SourceError(f"{file}: the demo's recording is missing from this installation")
-    return file
 
 
 def _labels(recording: Path) -> Labels:
@@ -86,24 +81,6 @@ def _labels(recording: Path) -> Labels:
         label = arrays[f"{CLIP}/label"]
         fps = float(arrays[f"{CLIP}/fps"])
     return Labels(np.arange(len(label)) / fps, label)
-
-
-def private_wire(config: Path | None, overrides: Sequence[str]) -> list[str]:
-    """Return overrides that keep a run off a wire in use: its own namespace, and free ports where some are taken."""
-    endpoints = load_config(config, overrides).bridge.endpoints
-    private = [f'bridge.namespace="demo-{os.getpid()}"', "launch.restart=false", f"launch.roles={list(ROLES)}"]
-    for role in ROLES:
-        try:
-            require_free(endpoints, [role])
-        except TransportError:
-            private.append(f"bridge.endpoints.{role}=tcp/127.0.0.1:{_free_port()}")
-    return private
-
-
-def _free_port() -> int:
-    with closing(socket.socket()) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def _write(

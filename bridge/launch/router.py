@@ -8,10 +8,10 @@ import time
 from contextlib import ExitStack, closing
 from typing import Final
 
+from bridge.command_line.options import ConfigOption, SetOption
 from bridge.config.load import load_config
 from bridge.keys.identity import ROUTER
 from bridge.launch.watch import StopSignals
-from bridge.record.options import ConfigOption, SetOption, config_path
 from bridge.transport.links import LinkWatch
 from bridge.transport.wire_log import WireLog
 from bridge.transport.zenoh import open_session
@@ -27,7 +27,7 @@ def router(config: ConfigOption = None, set_: SetOption = None) -> None:
 
     Example: surefoot router --set 'bridge.router.connect=["tls/10.0.0.2:7470"]'
     """
-    loaded = load_config(config_path(config), set_ or []).bridge
+    loaded = load_config(config, set_ or []).bridge
     logging.basicConfig(stream=sys.stderr, level=logging.INFO, format="%(asctime)s router %(levelname)s %(message)s")
     log = logging.getLogger(ROUTER)
     with ExitStack() as stack:

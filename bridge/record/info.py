@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from array import array
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from bridge.record.reader import Recorded, Recording
 from bridge.topics import TOPICS, Topic
 
 NAN = float("nan")
+LOOK_EVERY: Final = 1000  # messages
 
 
 class TopicInfo(NamedTuple):
@@ -43,15 +45,17 @@ class RecordingInfo(NamedTuple):
     foreign: dict[str, int]  # topics that are not Surefoot's -> messages
 
 
-def summarise(recording: Recording) -> RecordingInfo:
-    """Read `recording` to its end and return what is in it.
+def summarise(recording: Recording, looked: Callable[[], object] = lambda: None) -> RecordingInfo:
+    """Read `recording` to its end and return what is in it; `looked` is called every thousand messages.
 
     Raises:
         SourceError: the file cannot be read.
     """
     tallies: dict[str, _Tally] = {}
     first_ns = last_ns = 0
-    for recorded in recording.samples():
+    for number, recorded in enumerate(recording.samples()):
+        if number % LOOK_EVERY == 0:
+            looked()
         last_ns = recorded.log_time_ns
         first_ns = first_ns or last_ns
         tallies.setdefault(recorded.topic.key, _Tally()).add(recorded)

@@ -2,42 +2,37 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
-from typing import Annotated, Any
 
-import typer
+from rich.progress import BarColumn
 
 from bridge.clock import seconds
+from bridge.command_line.options import JsonOption, RecordingArgument
+from bridge.command_line.output import STDOUT, progress, require_writable, result, write_json
 from bridge.record.info import RecordingInfo, TopicInfo, summarise
-from bridge.record.options import FileArgument
 from bridge.record.reader import Recording
 
 HEADINGS = ("topic", "messages", "rate [Hz]", "gap [ms]", "age p50/p99/max [ms]", "publishers", "missing", "type")
 
 
-def info(
-    file: FileArgument,
-    as_json: Annotated[bool, typer.Option("--json", help="One JSON object instead of the table.")] = False,
-) -> None:
+def info(recording: RecordingArgument, json: JsonOption = None) -> None:
     """Say what is in a recording: per topic how many, how regular, how old on arrival, and what is missing.
 
     Reads files that were cut off as far as they go, and says so.
 
-    Example: surefoot info walk.mcap --json
+    Example: surefoot info walk.mcap --json -
     """
-    found = summarise(Recording(file))
-    typer.echo(json.dumps(_plain(found), indent=2) if as_json else _text(found))
-
-
-def _plain(found: RecordingInfo) -> dict[str, Any]:
-    """Return what JSON can say; it has no NaN."""
-    topics = [
-        {name: None if isinstance(value, float) and math.isnan(value) else value for name, value in row.items()}
-        for row in (topic._asdict() for topic in found.topics)
-    ]
-    return {**found._asdict(), "whole": not found.damage, "topics": topics}
+    if json is not None:
+        require_writable(json)
+    read = Recording(recording)
+    with progress("reading", BarColumn()) as bar:
+        task = bar.add_task("reading", total=1.0)
+        found = summarise(read, lambda: bar.update(task, completed=read.progress))
+    if json is not None:
+        write_json(json, {**found._asdict(), "whole": not found.damage})
+    if json != STDOUT:
+        result(_text(found))
 
 
 def _text(found: RecordingInfo) -> str:

@@ -5,16 +5,23 @@ from __future__ import annotations
 import time
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated, Final
-
-import typer
+from typing import Any, Final
 
 from bridge.clock import SystemClock
+from bridge.command_line.options import (
+    ConfigOption,
+    DurationOption,
+    ForceOption,
+    JsonOption,
+    RecordingOut,
+    SetOption,
+    TopicsOption,
+)
+from bridge.command_line.output import note, require_writable, write_json
 from bridge.config.load import load_config
 from bridge.launch.watch import StopSignals
 from bridge.record.layout import SUFFIX
 from bridge.record.meter import Meter
-from bridge.record.options import ConfigOption, OutOption, OverwriteOption, SetOption, TopicsOption, config_path
 from bridge.record.recorder import Recorder
 from bridge.record.roles import parse_topics
 from bridge.record.writer import BagWriter, RecordingError, require_free
@@ -26,12 +33,13 @@ DEFAULT_FOLDER: Final = Path("runs")
 
 
 def record(
-    out: OutOption = None,
+    out: RecordingOut = None,
+    force: ForceOption = False,
+    topics: TopicsOption = None,
+    duration: DurationOption = None,
     config: ConfigOption = None,
     set_: SetOption = None,
-    duration: Annotated[float | None, typer.Option(min=0, metavar="S", help="Stop after this long [s].")] = None,
-    topics: TopicsOption = None,
-    overwrite: OverwriteOption = False,
+    json: JsonOption = None,
 ) -> int:
     """Record what is on the wire, as it is, into an MCAP file in rosbag2 layout.
 
@@ -41,13 +49,15 @@ def record(
 
     Example: surefoot record --out walk.mcap --duration 60
     """
-    loaded = load_config(config_path(config), set_ or [])
+    loaded = load_config(config, set_ or [])
+    if json is not None:
+        require_writable(json)
     wanted = parse_topics(topics) if topics is not None else TOPICS
     path = out or _default_name()
-    require_free(path, overwrite=overwrite)
+    require_free(path, overwrite=force)
     with StopSignals() as stop, closing(ZenohTransport(loaded.bridge, "recorder", SystemClock())) as wire:
-        recorder = Recorder(wire, wanted, BagWriter(path, loaded.bridge.namespace, wanted, overwrite=overwrite))
-        typer.echo(f"recording {len(wanted)} topics to {path}; Ctrl-C ends it", err=True)
+        recorder = Recorder(wire, wanted, BagWriter(path, loaded.bridge.namespace, wanted, overwrite=force))
+        note(f"recording {len(wanted)} topics to {path}; Ctrl-C ends it")
         started_s = time.monotonic()
         meter = Meter()
         while stop.seen is None and recorder.failure is None:
@@ -59,7 +69,10 @@ def record(
             time.sleep(POLL_S)
         meter.end()
         recorder.close()
-    typer.echo(f"{path}: {_state(recorder, time.monotonic() - started_s)}", err=True)
+    elapsed_s = time.monotonic() - started_s
+    note(f"{path}: {_state(recorder, elapsed_s)}")
+    if json is not None:
+        write_json(json, _plain(recorder, path, elapsed_s))
     return 0
 
 
@@ -69,6 +82,17 @@ def _default_name() -> Path:
     except OSError as error:
         raise RecordingError(f"{DEFAULT_FOLDER}: cannot be created: {error.strerror}") from error
     return DEFAULT_FOLDER / f"recording-{time.strftime('%Y%m%d-%H%M%S')}{SUFFIX}"
+
+
+def _plain(recorder: Recorder, path: Path, elapsed_s: float) -> dict[str, Any]:
+    writer = recorder.writer
+    return {
+        "path": path,
+        "seconds": round(elapsed_s, 3),
+        "messages": writer.messages,
+        "bytes": writer.bytes_written,
+        "not_recorded": dict(recorder.dropped),
+    }
 
 
 def _state(recorder: Recorder, elapsed_s: float) -> str:

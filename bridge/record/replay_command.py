@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.progress import Progress
+from rich.progress import BarColumn, TimeElapsedColumn
 
 from bridge.clock import SystemClock
+from bridge.command_line import completion
+from bridge.command_line.options import (
+    ConfigOption,
+    ForceOption,
+    JsonOption,
+    RecordingArgument,
+    RecordingOut,
+    SetOption,
+    TopicsOption,
+)
+from bridge.command_line.output import note, progress, require_writable, write_json
 from bridge.config.load import load_config
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import ConfigError, SourceError
@@ -19,40 +29,37 @@ from bridge.record.feed import Processes, feed
 from bridge.record.meter import Meter
 from bridge.record.offline import replay_offline
 from bridge.record.online import Pace, Played, StandIns, play
-from bridge.record.options import (
-    ConfigOption,
-    FileArgument,
-    OutOption,
-    OverwriteOption,
-    SetOption,
-    TopicsOption,
-    config_path,
-)
 from bridge.record.reader import Recording
 from bridge.record.roles import INPUTS, outputs, parse_roles, parse_topics
 from bridge.record.writer import BagWriter, RecordingError
 from bridge.topics import TOPICS, Topic
 
+Told = dict[str, Any]  # what --json says of a replay
+
 
 def replay(
-    file: FileArgument,
+    recording: RecordingArgument,
     only: Annotated[
-        str | None, typer.Option(metavar="ROLE,...", help="Run these roles and feed them what they read.")
+        str | None,
+        typer.Option(
+            metavar="ROLE,...", autocompletion=completion.roles, help="Run these roles and feed them what they read."
+        ),
     ] = None,
     rate: Annotated[float, typer.Option(min=0.01, max=100, metavar="X", help="Speed; 1 is real time.")] = 1.0,
     as_fast_as_possible: Annotated[
         bool, typer.Option("--as-fast-as-possible", help="With --only: in simulated time, the same result every time.")
     ] = False,
-    out: OutOption = None,
-    overwrite: OverwriteOption = False,
+    out: RecordingOut = None,
+    force: ForceOption = False,
     topics: TopicsOption = None,
     delay: Annotated[float, typer.Option(min=0, metavar="S", help="Let readers connect for so long [s].")] = 1.0,
-    config: ConfigOption = None,
-    set_: SetOption = None,
     option: Annotated[
         list[str] | None,
         typer.Option(metavar="[ROLE.]NAME=VALUE", help="Option of a role, such as controller=log; repeatable."),
     ] = None,
+    config: ConfigOption = None,
+    set_: SetOption = None,
+    json: JsonOption = None,
 ) -> int:
     """Replay a recording: the whole of it on the wire of this machine, or to one process with --only.
 
@@ -62,67 +69,74 @@ def replay(
 
     Example: surefoot replay walk.mcap --only controller --as-fast-as-possible --out again.mcap
     """
-    recording = Recording(file)
-    path = config_path(config)
-    loaded = load_config(path, set_ or [])
+    found = Recording(recording)
+    loaded = load_config(config, set_ or [])
+    if json is not None:
+        require_writable(json)
     if only is None:
         _refuse("--out", out is not None, "goes with --only: without a process there is nothing to write")
         _refuse("--as-fast-as-possible", as_fast_as_possible, "goes with --only: live processes know real time alone")
         _refuse("--option", bool(option), "goes with --only")
-        _replay_all(recording, loaded, topics, Pace(rate, delay))
+        told = _replay_all(found, loaded, topics, Pace(rate, delay))
+        if json is not None:
+            write_json(json, told)
         return 0
     _refuse("--topics", topics is not None, "goes without --only: a role is fed all it reads")
     _refuse("--rate", as_fast_as_possible and rate != 1.0, "does not go with --as-fast-as-possible")
     roles = parse_roles(only)
-    processes = Processes(roles, loaded, path, set_ or [], _role_options(option or [], roles))
-    writer = _writer(recording, out, processes, overwrite=overwrite)
+    processes = Processes(roles, loaded, config, set_ or [], _role_options(option or [], roles))
+    writer = _writer(found, out, processes, overwrite=force)
     try:
         if as_fast_as_possible:
-            _run_offline(recording, processes, writer)
+            told = _run_offline(found, processes, writer)
         else:
-            _run_processes(recording, processes, Pace(rate, delay), writer)
+            told = _run_processes(found, processes, Pace(rate, delay), writer)
     except BaseException:
         if writer is not None:
             writer.discard()
         raise
+    if json is not None:
+        write_json(json, told)
     return 0
 
 
-def _replay_all(recording: Recording, config: SurefootConfig, topics: str | None, pace: Pace) -> None:
+def _replay_all(recording: Recording, config: SurefootConfig, topics: str | None, pace: Pace) -> Told:
     listened = [topic for topic in TOPICS if topic.key in recording.listened]
     wanted: Sequence[Topic] = parse_topics(topics) if topics is not None else listened or TOPICS
     roles = {topic.publisher for topic in wanted} - {"*"}
     clock = SystemClock()
     with StandIns(config.bridge, roles or INPUTS, clock) as stand_ins, _Watch(recording) as watch:
         played = play(recording, wanted, stand_ins, pace, clock, watch)
-    _say_played(recording, played)
+    return _say_played(recording, played)
 
 
-def _run_offline(recording: Recording, processes: Processes, writer: BagWriter | None) -> None:
-    console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task(" and ".join(processes.roles), total=1.0)
+def _run_offline(recording: Recording, processes: Processes, writer: BagWriter | None) -> Told:
+    with progress("{task.description}", BarColumn(), TimeElapsedColumn()) as bar:
+        task = bar.add_task(" and ".join(processes.roles), total=1.0)
         result = replay_offline(
             recording,
             processes.roles,
             processes.config,
             processes.options,
             _drop if writer is None else writer.write,
-            lambda done: progress.update(task, completed=done),
+            lambda done: bar.update(task, completed=done),
         )
     if writer is not None:
         writer.finish()
-    typer.echo(f"{recording.path}: {result.simulated_s:.1f} s; {_counts('fed', result.fed)}", err=True)
-    typer.echo(_answered(result.answered, writer), err=True)
+    note(f"{recording.path}: {result.simulated_s:.1f} s; {_counts('fed', result.fed)}")
+    note(_answered(result.answered, writer))
     _say_damage(recording)
+    return {"recording": recording.path, "damage": recording.damage, **result._asdict()}
 
 
-def _run_processes(recording: Recording, processes: Processes, pace: Pace, writer: BagWriter | None) -> None:
+def _run_processes(recording: Recording, processes: Processes, pace: Pace, writer: BagWriter | None) -> Told:
     with _Watch(recording) as watch:
         played = feed(recording, processes, pace, writer, watch)
-    _say_played(recording, played)
+    told = _say_played(recording, played)
     if writer is not None:
-        typer.echo(f"{writer.out}: {writer.messages} messages", err=True)
+        note(f"{writer.out}: {writer.messages} messages")
+        told["answered"] = writer.messages
+    return told
 
 
 class _Watch:
@@ -133,7 +147,7 @@ class _Watch:
 
     def __enter__(self) -> _Watch:
         self._signals.__enter__()
-        typer.echo(f"replaying {self._name}; Ctrl-C ends it", err=True)
+        note(f"replaying {self._name}; Ctrl-C ends it")
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -176,16 +190,17 @@ def _drop(_topic: Topic, _sample: object) -> None:
     """Keep nothing."""
 
 
-def _say_played(recording: Recording, played: Played) -> None:
+def _say_played(recording: Recording, played: Played) -> Told:
     if not played.sent:
         raise SourceError(f"{recording.path}: nothing to replay")
-    typer.echo(f"{_counts('sent', played.sent)}; at most {played.latest_s * 1e3:.0f} ms late", err=True)
+    note(f"{_counts('sent', played.sent)}; at most {played.latest_s * 1e3:.0f} ms late")
     _say_damage(recording)
+    return {"recording": recording.path, "damage": recording.damage, **played._asdict()}
 
 
 def _say_damage(recording: Recording) -> None:
     if recording.damage:
-        typer.echo(f"{recording.path} is not whole: {recording.damage}", err=True)
+        note(f"{recording.path} is not whole: {recording.damage}")
 
 
 def _answered(counts: Mapping[str, int], writer: BagWriter | None) -> str:

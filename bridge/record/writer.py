@@ -44,7 +44,7 @@ def require_free(out: Path, *, overwrite: bool = False) -> None:
         RecordingError: something is there already, or its folder is not.
     """
     if not overwrite and (out.exists() or out.is_symlink()):
-        raise RecordingError(f"{out}: the name is taken; --overwrite replaces it")
+        raise RecordingError(f"{out}: the name is taken; --force replaces it")
     if not out.parent.is_dir():
         raise RecordingError(f"{out}: no such folder: {out.parent}")
 

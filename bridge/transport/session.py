@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Final
 
 from bridge.config.bridge import BridgeConfig
@@ -51,6 +52,18 @@ def zenoh_settings(config: BridgeConfig, role: str, credentials: Credentials | N
         settings["transport/link/tls"] = _tls(credentials)
         settings["access_control"] = access_control(names_of(config))
     return settings
+
+
+def nested(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings by path (`connect/endpoints`) as the nested object that a file of Zenoh's holds."""
+    tree: dict[str, Any] = {}
+    for path, value in settings.items():
+        *branches, leaf = path.split("/")
+        here = tree
+        for branch in branches:
+            here = here.setdefault(branch, {})
+        here[leaf] = value
+    return tree
 
 
 def _links(config: BridgeConfig, role: str) -> tuple[tuple[str, ...], tuple[str, ...]]:

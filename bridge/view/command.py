@@ -14,12 +14,13 @@ from typing import Annotated, Any, Final
 import typer
 
 from bridge.clock import SystemClock
+from bridge.command_line.options import ConfigOption, CropOption, DurationOption, ForceOption, SetOption
+from bridge.command_line.output import note
 from bridge.config.load import load_config
 from bridge.config.perception import SourceConfig
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import ConfigError, SourceError
 from bridge.launch.watch import StopSignals
-from bridge.record.options import ConfigOption, OverwriteOption, SetOption, config_path
 from bridge.record.reader import Recording
 from bridge.transport.zenoh import ZenohTransport
 from bridge.view import viewer
@@ -37,9 +38,11 @@ def view(
     recording: Annotated[
         Path | None, typer.Argument(metavar="[RECORDING]", help="An .mcap file or rosbag2 folder; none: what runs now.")
     ] = None,
-    save: Annotated[
-        Path | None, typer.Option(metavar="FILE.rrd", help="Write a file for Rerun instead of opening a window.")
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE.rrd", help="Write a file for Rerun instead of opening a window."),
     ] = None,
+    force: ForceOption = False,
     serve: Annotated[
         bool, typer.Option("--serve", help="Show it in a browser instead of a window; on this machine only.")
     ] = False,
@@ -47,15 +50,14 @@ def view(
         int, typer.Option(min=1024, max=65534, help="Of the page; its data are at the next port.")
     ] = WEB_PORT,
     window: Annotated[
-        bool | None, typer.Option("--window/--no-window", help="Default: a window unless --save or --serve is given.")
+        bool | None, typer.Option("--window/--no-window", help="Default: a window unless --out or --serve is given.")
     ] = None,
     video: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Video or image folder that perception saw, laid underneath.")
     ] = None,
-    crop: Annotated[str | None, typer.Option(metavar="X,Y,W,H", help="Part of the video that was used.")] = None,
+    crop: CropOption = None,
     video_offset: Annotated[float, typer.Option(metavar="S", help="Show the video this much later [s].")] = 0.0,
-    duration: Annotated[float | None, typer.Option(min=0, metavar="S", help="Stop after this long [s].")] = None,
-    overwrite: OverwriteOption = False,
+    duration: DurationOption = None,
     config: ConfigOption = None,
     set_: SetOption = None,
 ) -> int:
@@ -64,10 +66,11 @@ def view(
     Only listens: whatever happens to it, the running control notices nothing. Ends with Ctrl-C,
     SIGTERM, its window, or --duration. Exit code 2: bad input, no display, a file that cannot be written.
 
-    Examples: `surefoot view` beside `surefoot up`;
-    `surefoot view walk.mcap`; `surefoot view walk.mcap --save walk.rrd --video walk.mp4`.
+    Example: surefoot view walk.mcap --out walk.rrd --video walk.mp4
+
+    Beside `surefoot up`: surefoot view
     """
-    loaded = load_config(config_path(config), set_ or [])
+    loaded = load_config(config, set_ or [])
     rerun = load_rerun()
     found = None if recording is None else Recording(recording)
     if found is not None:
@@ -80,15 +83,15 @@ def view(
     )
     with ExitStack() as stack:
         stop = stack.enter_context(StopSignals())
-        file = None if save is None else stack.enter_context(RrdFile(save, overwrite=overwrite))
+        file = None if out is None else stack.enter_context(RrdFile(out, overwrite=force))
         viewers = []
         if serve:
             viewers.append(stack.enter_context(viewer.web(rerun.viewer, port)))
-            typer.echo(f"open {viewer.page(port)}", err=True)
-        if window if window is not None else not serve and save is None:
+            note(f"open {viewer.page(port)}")
+        if window if window is not None else not serve and out is None:
             viewers.append(stack.enter_context(viewer.window(rerun.viewer)))
         if not viewers and file is None:
-            raise ConfigError("--no-window leaves nothing to show on: add --save FILE.rrd or --serve")
+            raise ConfigError("--no-window leaves nothing to show on: add --out FILE.rrd or --serve")
         studio = Studio(rerun, subject, viewers, file)
         until_s = None if duration is None else time.monotonic() + duration
 
@@ -103,24 +106,24 @@ def view(
             studio.show_recording(found, ended)
             studio.finish()
             if found.damage:
-                typer.echo(f"{found.path}: not whole: {found.damage}", err=True)
+                note(f"{found.path}: not whole: {found.damage}")
             while viewers and not ended():
                 time.sleep(WAIT_S)
         for one in viewers:
             one.require_well()
-    if save is not None:
-        typer.echo(f"{save}: {save.stat().st_size / 1e6:.2f} MB", err=True)
+    if out is not None:
+        note(f"{out}: {out.stat().st_size / 1e6:.2f} MB")
     return 0
 
 
 def _live(studio: Studio, config: SurefootConfig, ended: Callable[[], bool]) -> None:
     os.nice(NICENESS)
-    typer.echo("listening only; Ctrl-C ends it", err=True)
+    note("listening only; Ctrl-C ends it")
     clock = SystemClock()
     with closing(ZenohTransport(config.bridge, "viewer", clock)) as transport:
         lost = studio.show_live(transport, clock, ended)
     if lost:
-        typer.echo(f"{lost} messages came faster than they could be drawn and are not shown", err=True)
+        note(f"{lost} messages came faster than they could be drawn and are not shown")
 
 
 def _video(video: Path | None, crop: str | None, source: SourceConfig, offset_s: float, *, live: bool) -> Video | None:

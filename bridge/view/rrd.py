@@ -26,7 +26,7 @@ class RrdFile:
         if path.suffix != SUFFIX:
             raise SurefootError(f"{path}: Rerun reads files that end in {SUFFIX}")
         if not overwrite and (path.exists() or path.is_symlink()):
-            raise SurefootError(f"{path}: the name is taken; --overwrite replaces it")
+            raise SurefootError(f"{path}: the name is taken; --force replaces it")
         try:
             handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}.", suffix=SUFFIX)
         except OSError as error:

@@ -19,12 +19,13 @@ from pathlib import Path
 from typing import IO, Final, Self
 
 from bridge.errors import SurefootError
+from bridge.launch.ports import free_ports
 
 LOOPBACK: Final = "127.0.0.1"
 READY_S: Final = 30.0
 STOP_S: Final = 3.0
 MEMORY: Final = "2GiB"  # of what is shown; the oldest is dropped beyond it
-INSTEAD: Final = "--save FILE.rrd writes a file instead, --serve shows it in a browser"
+INSTEAD: Final = "--out FILE.rrd writes a file instead, --serve shows it in a browser"
 
 
 class Viewer:
@@ -124,7 +125,7 @@ def window(program: Path) -> Viewer:
     """
     if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise SurefootError(f"there is no display to open a window on; {INSTEAD}")
-    return Viewer(program, _free_port(), ["--hide-welcome-screen", "--expect-data-soon"])
+    return Viewer(program, free_ports(1)[0], ["--hide-welcome-screen", "--expect-data-soon"])
 
 
 def web(program: Path, port: int) -> Viewer:
@@ -146,9 +147,3 @@ def web(program: Path, port: int) -> Viewer:
 def page(port: int) -> str:
     """Return the address for a browser."""
     return f"http://{LOOPBACK}:{port}/?url=rerun%2Bhttp%3A%2F%2F{LOOPBACK}%3A{port + 1}%2Fproxy"
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind((LOOPBACK, 0))
-        return int(probe.getsockname()[1])

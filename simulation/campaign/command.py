@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 
+from bridge.command_line.options import ConfigOption, JobsOption, JsonOption, SeedOption, SetOption
+from bridge.command_line.output import STDOUT, note, progress, require_writable, result, write_json
 from bridge.config.load import load_config
 from simulation.campaign.arms import ARMS
 from simulation.campaign.campaign import Plan, run_campaign
 from simulation.campaign.report import PAGE, SUMMARY, number
-from simulation.campaign.store import write
 
 SHOWN = (
     "falls", "falls_arrested", "non_falls", "needless_arrests", "needless_guards", "tip_overs", "pelvis_drop_p95_m",
@@ -26,16 +25,18 @@ SHOWN = (
 def campaign(
     scenarios: Annotated[int, typer.Option(min=1, help="Falls, and as many non-falls.")] = 300,
     non_falls: Annotated[int | None, typer.Option(min=0, help="Non-falls, if not as many as falls.")] = None,
-    jobs: Annotated[int, typer.Option(min=1, help="Scenarios at a time on this machine.")] = 1,
-    seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn.")] = 0,
-    out: Annotated[Path, typer.Option(help="Folder of the results; a stopped campaign goes on there.")] = Path(
-        "runs/campaign"
-    ),
-    arms: Annotated[str, typer.Option(help="Which arms, with commas.")] = ",".join(ARMS),
-    cluster: Annotated[str, typer.Option(help="Address of a Dask scheduler that does the work instead.")] = "",
-    config: Annotated[Path | None, typer.Option(help="Configuration file.")] = None,
-    set_: Annotated[list[str] | None, typer.Option("--set", help="section.key=value on top of it.")] = None,
-    json: Annotated[Path | None, typer.Option(help="Write the summary here too.")] = None,
+    arms: Annotated[str, typer.Option(metavar="ARM,...", help="Which arms.")] = ",".join(ARMS),
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FOLDER", help="Folder of the results; a stopped campaign goes on there.")
+    ] = Path("runs/campaign"),
+    seed: SeedOption = 0,
+    jobs: JobsOption = 1,
+    cluster: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Address of a Dask scheduler that does the work instead.")
+    ] = "",
+    config: ConfigOption = None,
+    set_: SetOption = None,
+    json: JsonOption = None,
 ) -> int:
     """Let hundreds of simulated people fall and not fall, without intervention, with a reactive one, with anticipation.
 
@@ -48,18 +49,17 @@ def campaign(
         scenarios, scenarios if non_falls is None else non_falls, seed, load_config(config, set_ or []),
         tuple(arm.strip() for arm in arms.split(",")),
     )  # fmt: skip
-    console = Console(stderr=True)
-    columns = (TextColumn("scenarios"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, disable=not sys.stderr.isatty()) as progress:
-        bar = progress.add_task("scenarios", total=None)
-        summary = run_campaign(
-            plan, out, jobs, cluster, lambda done, of: progress.update(bar, completed=done, total=of)
-        )
-    Console().print(_table(summary))
-    Console().print(f"{out / PAGE}\n{out / SUMMARY}", soft_wrap=True, highlight=False)
     if json is not None:
-        json.parent.mkdir(parents=True, exist_ok=True)
-        write(json, {"plan": plan.described(), **summary})
+        require_writable(json)
+    columns = (TextColumn("scenarios"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with progress(*columns, transient=False) as bar:
+        task = bar.add_task("scenarios", total=None)
+        summary = run_campaign(plan, out, jobs, cluster, lambda done, of: bar.update(task, completed=done, total=of))
+    if json is not None:
+        write_json(json, {"plan": plan.described(), **summary})
+    if json != STDOUT:
+        result(_table(summary))
+    note(f"{out / PAGE}", f"{out / SUMMARY}")
     return 0
 
 

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Final, NamedTuple
+from typing import Annotated, Any, Final, NamedTuple
 
 import numpy as np
 import typer
@@ -15,10 +15,13 @@ from rich.console import Console
 from rich.table import Table
 
 from bridge.clock import NS
+from bridge.command_line.options import ConfigOption, JsonOption, SetOption
+from bridge.command_line.output import STDOUT, note, note_console, require_writable, result, write_json
 from bridge.config.load import load_config
 from bridge.errors import SurefootError
 from bridge.launch.observed import observe
-from bridge.launch.rehearse import private_wire
+from bridge.launch.private import private_wire
+from bridge.launch.rehearse import ROLES
 from bridge.launch.timeline import Row
 from simulation.scenarios.arrest import ALLOWED_DROP_M
 from simulation.scenarios.single import AFTER_EVENT_S
@@ -26,7 +29,12 @@ from simulation.trial.figure import Told, draw
 from simulation.trial.outcome import Outcome, outcome_of
 from simulation.trial.trace import Trace, load_trace
 
-WORLD: Final = ('launch.modules.drive="simulation.node"', 'simulation.begins="armed"')
+WORLD: Final = (
+    f"launch.roles={list(ROLES)}",
+    "launch.restart=false",
+    'launch.modules.drive="simulation.node"',
+    'simulation.begins="armed"',
+)
 START_LIMIT_S: Final = 30.0  # no trial takes longer than its scenario and this, whatever happens
 FILM_LIMIT_S: Final = 120.0
 RECORDER_STOP_S: Final = 20.0
@@ -44,14 +52,13 @@ class Trial(NamedTuple):
 
 
 def demo(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where film, pictures and recordings go.")] = Path(
-        "runs/demo"
-    ),
-    config: Annotated[Path | None, typer.Option(metavar="FILE", help="Configuration; default: the defaults.")] = None,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Override a value; repeatable.")
-    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FOLDER", help="Where film, pictures and recordings go.")
+    ] = Path("runs/demo"),
     film: Annotated[bool, typer.Option(help="Render demo.gif and demo.png.")] = True,
+    config: ConfigOption = None,
+    set_: SetOption = None,
+    json: JsonOption = None,
 ) -> int:
     """Run the real processes with a simulated person, twice: with Surefoot, and with its intervention switched off.
 
@@ -60,8 +67,10 @@ def demo(
 
     Example: surefoot demo --set simulation.scenario=trip --set simulation.person_mass_kg=100
     """
-    console = Console(highlight=False, soft_wrap=True)
-    overrides = [*(set_ or []), *private_wire(config, set_ or []), *WORLD]
+    if json is not None:
+        require_writable(json)
+    console = note_console()
+    overrides = [*(set_ or []), *private_wire(config, set_ or [], ROLES, "demo"), *WORLD]
     settings = load_config(config, overrides).simulation
     console.print(
         f"[bold]surefoot demo[/]  {settings.person_height_m:.2f} m, {settings.person_mass_kg:.0f} kg, walking at"
@@ -81,10 +90,16 @@ def demo(
     made = ["timeline.png", *(name for name in ("held.mcap", "unheld.mcap") if (out / name).is_file())]
     if film and _film(out, config, overrides, settings.event_s, console):
         made = ["demo.gif", "demo.png", *made]
-    console.print()
-    console.print(_side_by_side(held, unheld))
-    console.print(f"in [bold]{out}[/]: {', '.join(made)}")
+    if json is not None:
+        write_json(json, {"held": _plain(held), "unheld": _plain(unheld), "folder": out, "files": made})
+    if json != STDOUT:
+        result(_side_by_side(held, unheld))
+    note(f"in {out}: {', '.join(made)}")
     return 0
+
+
+def _plain(trial: Trial) -> dict[str, Any]:
+    return {**trial.outcome._asdict(), "held": trial.outcome.held, "reason": trial.reason}
 
 
 def _run(
@@ -115,7 +130,7 @@ def _run(
 @contextmanager
 def _recording(path: Path, config: Path | None, overrides: Sequence[str]) -> Iterator[None]:
     """Record the wire into `path` meanwhile, in a process of its own."""
-    words = ["record", "--out", str(path), "--overwrite"]
+    words = ["record", "--out", str(path), "--force"]
     words += ["--config", str(config)] if config is not None else []
     words += [word for override in overrides for word in ("--set", override)]
     process = subprocess.Popen(  # noqa: S603 (our own command)

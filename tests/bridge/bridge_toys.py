@@ -101,7 +101,7 @@ class Stage:
     def write_config(self, launch: str = "", modules: Mapping[str, str] | None = None) -> None:
         used = modules or {role: f"toy_{role}" for role in ROLES}
         self.config.write_text(
-            f"[launch]\nlog_dir = '{self.folder / 'logs'}'\n{textwrap.dedent(launch)}\n"
+            f"version = 1\n[launch]\nlog_dir = '{self.folder / 'logs'}'\n{textwrap.dedent(launch)}\n"
             + "[launch.modules]\n"
             + "".join(f"{role} = '{module}'\n" for role, module in used.items())
             + "[bridge.endpoints]\n"
@@ -127,10 +127,10 @@ class Stage:
 
 
 class Up:
-    """A running `surefoot up --json`, read record by record."""
+    """A running `surefoot up --json -`, read record by record."""
 
     def __init__(self, stage: Stage, *arguments: str) -> None:
-        command = [sys.executable, "-m", "bridge.cli", "up", "--config", str(stage.config), "--json", *arguments]
+        command = [sys.executable, "-m", "bridge.cli", "up", "--config", str(stage.config), "--json", "-", *arguments]
         self.process = subprocess.Popen(
             command,
             env=stage.environment(),

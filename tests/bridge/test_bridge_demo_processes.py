@@ -41,7 +41,7 @@ def modules(stage: Stage, **other: str) -> None:
 
 
 def test_it_ends_by_itself_and_leaves_picture_and_numbers(stage: Stage) -> None:
-    shown, errors = (process := start(stage, "--seconds", "3")).communicate(timeout=PATIENCE_S)
+    shown, errors = (process := start(stage, "--duration", "3")).communicate(timeout=PATIENCE_S)
     assert (process.returncode, errors) == (0, "")
     assert "FOLLOW" in shown
     assert "timeline.png" in shown.splitlines()[-1]

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+import socket
 import stat
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
+import zenoh
+from bridge_toys import free_ports
 from cryptography import x509
 from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric import rsa
@@ -23,6 +26,7 @@ from bridge.keys.check import common_name, hosts, load_credentials
 from bridge.keys.files import KeysError, make_folder, write, write_pair
 from bridge.keys.identity import IDENTITIES, OBSERVER, PUBLISHERS, identity_of
 from bridge.topics import TOPICS
+from bridge.transport.session import zenoh_settings
 from bridge.transport.zenoh import open_session
 
 
@@ -261,7 +265,7 @@ def test_show_says_what_is_good_and_what_is_not(folder: Path, capsys: pytest.Cap
     assert "good" in lines["perception"]
     assert "expires in 9 days" in lines["drive"]
     (folder / "perception.key").chmod(0o644)
-    code, out, _ = run(capsys, "keys", "show", "--keys", folder, "--json")
+    code, out, _ = run(capsys, "keys", "show", "--keys", folder, "--json", "-")
     assert code == 1
     rows = {row["name"]: row for row in json.loads(out)["certificates"]}
     assert "mode 644 lets others in" in rows["perception"]["trouble"]
@@ -285,13 +289,98 @@ def test_an_authority_can_be_changed_without_a_gap(folder: Path) -> None:
         assert load_credentials(folder, role).warnings == ()
 
 
+def test_the_authority_signs_with_the_certificate_of_its_key(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """While the authority is changed there are two in ca.pem, in either order."""
+    new = create_authority(3650)
+    old = (folder / "ca.pem").read_bytes()
+    for key, order in ((None, [new.certificate_pem(), old]), (new.key_pem(), [old, new.certificate_pem()])):
+        write(folder / "ca.pem", b"".join(order), 0o644, replace=True)
+        if key is not None:
+            write(folder / "ca.key", key, 0o600, replace=True)
+        assert run(capsys, "keys", "issue", "drive", "--keys", folder, "--renew")[0] == 0
+        assert load_credentials(folder, "drive").warnings == ()
+
+
+def test_an_authority_whose_key_and_certificate_do_not_match_signs_nothing(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(folder / "ca.key", create_authority(3650).key_pem(), 0o600, replace=True)
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    out = folder.parent / "elsewhere"
+    for words in (["--renew"], ["--out", str(out)]):
+        code, _, error = run(capsys, "keys", "issue", "--keys", folder, *words)
+        assert code == 2
+        assert "ca.pem: its certificate does not belong to the key in" in error
+    write(folder / "ca.pem", b"".join(create_authority(9).certificate_pem() for _ in range(2)), 0o644, replace=True)
+    assert "none of 2 belongs to the key in" in run(capsys, "keys", "issue", "--keys", folder, "--renew")[2]
+    after = {path: path.read_bytes() for path in folder.iterdir() if path.name != "ca.pem"}
+    assert after == {path: content for path, content in before.items() if path.name != "ca.pem"}
+    assert not out.exists()
+
+
+def test_if_one_role_cannot_be_written_none_is(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, error = run(capsys, "keys", "issue", "drive", "perception", "--keys", folder)
+    assert code == 2
+    assert "perception.key: is there already" in error
+    assert not (folder / "drive.key").exists()
+
+
+def test_what_expired_says_the_command_that_mends_it(folder: Path) -> None:
+    with pytest.raises(KeysError, match="expired on") as caught:
+        load_credentials(folder, "perception", datetime.now(UTC) + timedelta(days=366))
+    assert f"surefoot keys issue perception --renew --keys {folder} makes" in str(caught.value)
+
+
+def test_an_expired_authority_signs_nothing_and_says_what_helps(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    gone = create_authority(0)
+    write_pair(folder, "ca", gone, replace=True)
+    new = f"surefoot keys init --keys {folder}-new and surefoot keys issue --keys {folder}-new make a new authority"
+    code, _, error = run(capsys, "keys", "issue", "drive", "--keys", folder)
+    assert code == 2
+    assert "ca.pem: expired on" in error
+    assert new in error
+    assert not (folder / "drive.key").exists()
+    write_pair(folder, "perception", issue(gone, "perception", [], 365), replace=True)
+    code, out, _ = run(capsys, "keys", "show", "--keys", folder)
+    assert code == 1
+    assert new in out
+
+
+def test_without_a_folder_the_hint_is_a_command_that_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    missing = tmp_path / "keys"
+    with pytest.raises(KeysError) as caught:
+        load_credentials(missing, "drive")
+    words = str(caught.value).partition("surefoot ")[2].removesuffix(" makes one").split()
+    assert run(capsys, *words)[0] == 0
+    assert (missing / "ca.pem").exists()
+
+
 def test_zenoh_configuration_of_a_role(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, out, _ = run(capsys, "keys", "zenoh", "router", "--config", made / "bridge.toml")
-    assert code == 0
+    """As a file that zenohd reads: what is printed is what a process opens its session with."""
+    for role in ("router", "drive", "observer"):
+        code, out, _ = run(capsys, "keys", "zenoh", role, "--config", made / "bridge.toml")
+        assert code == 0
+        loaded = zenoh.Config.from_json5(out)
+        credentials = load_credentials(made.resolve(), role)
+        opened = zenoh.Config()
+        for path, value in zenoh_settings(load_config(made / "bridge.toml").bridge, role, credentials).items():
+            opened.insert_json5(path, json.dumps(value))
+        assert json.loads(str(loaded)) == json.loads(str(opened))
     settings = json.loads(out)
-    assert settings["mode"] == "router"
-    assert settings["transport/link/tls"]["enable_mtls"] is True
+    assert settings["transport"]["link"]["tls"]["enable_mtls"] is True
     assert settings["access_control"]["default_permission"] == "deny"
+    assert Path(settings["transport"]["link"]["tls"]["connect_private_key"]).is_absolute()
+
+
+def test_a_session_opens_with_the_printed_configuration(capsys: pytest.CaptureFixture[str]) -> None:
+    port = free_ports(1)[0]
+    words = ["keys", "zenoh", "drive", "--set", f"bridge.endpoints.drive=tcp/127.0.0.1:{port}"]
+    code, out, _ = run(capsys, *words)
+    assert code == 0
+    with zenoh.open(zenoh.Config.from_json5(out)), socket.create_connection(("127.0.0.1", port), timeout=5.0):
+        pass
 
 
 @pytest.mark.parametrize(

@@ -93,7 +93,7 @@ def test_nothing_heard_is_not_a_number() -> None:
 @pytest.mark.timeout(300)
 def test_the_command_measures_the_real_processes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "out" / "latency.json"
-    assert main(["latency", "--seconds", "2", "--controller", "log", "--json", str(file)]) == 0
+    assert main(["latency", "--duration", "2", "--controller", "log", "--json", str(file)]) == 0
     result = json.loads(file.read_text())
     assert result["frame_to_command_ms"].keys() == {"frames", "p50", "p99", "max"}
     assert result["frame_to_command_ms"]["frames"] > 10

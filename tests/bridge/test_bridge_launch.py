@@ -15,10 +15,11 @@ from bridge_toys import free_ports, listening
 from rich.console import Console
 
 from bridge.clock import ManualClock
+from bridge.command_line.output import STDOUT
 from bridge.config.load import load_config
 from bridge.errors import ConfigError, SurefootError, TransportError
 from bridge.launch import screen
-from bridge.launch.display import Lines, Screen
+from bridge.launch.display import JsonLines, Screen
 from bridge.launch.launcher import Launcher, Phase, ProcessState
 from bridge.launch.logfile import LogFile
 from bridge.launch.monitor import Monitor
@@ -209,7 +210,7 @@ class TestScreen:
 
     def test_lines_come_once_a_second_and_after_news(self, capsys: pytest.CaptureFixture[str]) -> None:
         view = World().monitor.look()
-        with Lines(as_json=True) as lines:
+        with JsonLines(STDOUT) as lines:
             for elapsed_s in (0.0, 0.5, 0.99, 1.0, 1.5):
                 lines.show(elapsed_s, {}, view)
             lines.say(1.6, "the end")

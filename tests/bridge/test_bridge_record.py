@@ -151,7 +151,7 @@ def test_a_folder_is_a_rosbag2_folder(tmp_path: Path) -> None:
 def test_a_taken_name_is_refused_unless_told(tmp_path: Path, name: str) -> None:
     out = write(tmp_path / name, EVENTS[:100])
     before = Recording(out).files[0].read_bytes()
-    with pytest.raises(RecordingError, match="name is taken; --overwrite"):
+    with pytest.raises(RecordingError, match="name is taken; --force"):
         BagWriter(out, NAMESPACE, TOPICS)
     assert Recording(out).files[0].read_bytes() == before
     writer = BagWriter(out, NAMESPACE, TOPICS, overwrite=True)
@@ -309,7 +309,7 @@ def test_synthetic_messages_are_acceptable() -> None:
 @pytest.mark.parametrize(
     ("arguments", "what"),
     [
-        (["--out", "taken.mcap"], "taken.mcap: the name is taken; --overwrite replaces it"),
+        (["--out", "taken.mcap"], "taken.mcap: the name is taken; --force replaces it"),
         (["--out", "nowhere/walk.mcap"], "no such folder: nowhere"),
         (["--out", "walk.mcap", "--topics", "odometry"], "--topics odometry: no such topic"),
         (["--out", "walk.mcap", "--set", "bridge.lease_ms=1"], "lease_ms"),

@@ -79,7 +79,7 @@ def test_a_file_that_was_cut_off_is_read_and_said(truncated: Path, capsys: pytes
     out = capsys.readouterr().out
     assert "not whole: cut off after" in out
     assert "recovered" in out
-    assert main(["info", str(truncated), "--json"]) == 0
+    assert main(["info", str(truncated), "--json", "-"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["whole"] is False
     assert 1.4 < found["duration_s"] < 1.6
@@ -87,7 +87,7 @@ def test_a_file_that_was_cut_off_is_read_and_said(truncated: Path, capsys: pytes
 
 def test_json_has_no_nan(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write(tmp_path / "silent.mcap", numbered([3]), (KEYPOINTS, ODOMETRY))
-    assert main(["info", str(path), "--json"]) == 0
+    assert main(["info", str(path), "--json", "-"]) == 0
     found = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
     assert found["whole"] is True
     assert found["topics"][0]["rate_hz"] is None

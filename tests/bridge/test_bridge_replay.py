@@ -139,7 +139,7 @@ def test_two_runs_of_the_command_write_the_same_file(walked: Path, tmp_path: Pat
         (["--only", "perceptoin"], "no such role"),
         (["--only", "controller", "--option", "anticipation.x=1"], "expected ROLE.NAME=VALUE"),
         (["--only", "controller", "--option", "controller"], "expected ROLE.NAME=VALUE"),
-        (["--only", "controller", "--as-fast-as-possible", "--out", "IN", "--overwrite"], "is the recording"),
+        (["--only", "controller", "--as-fast-as-possible", "--out", "IN", "--force"], "is the recording"),
         (["--only", "controller", "--as-fast-as-possible", "--out", "IN"], "is the recording"),
         (["--only", "drive", "--as-fast-as-possible", "--option", "sript=fall", "--out", "OUT"], "drive option sript"),
     ],

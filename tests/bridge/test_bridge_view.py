@@ -28,7 +28,7 @@ EVENTS = foreseen(1.5)
 
 def shown(events: list[Event], folder: Path, *arguments: str) -> Rrd:
     out = folder / "walk.rrd"
-    assert main(["view", str(write(folder / "walk.mcap", events)), "--save", str(out), *arguments]) == 0
+    assert main(["view", str(write(folder / "walk.mcap", events)), "--out", str(out), *arguments]) == 0
     assert sorted(path.name for path in folder.iterdir()) == ["walk.mcap", "walk.rrd"]
     return Rrd(out)
 

@@ -103,8 +103,8 @@ def test_killed_beside_a_running_system_nothing_changes(tmp_path: Path) -> None:
             for topic, samples in heard.items():
                 reader.subscribe(topic, samples.append)
             with (
-                view("--save", "killed.rrd", "--config", config, cwd=tmp_path) as killed,
-                view("--save", "ended.rrd", "--config", config, cwd=tmp_path) as ended,
+                view("--out", "killed.rrd", "--config", config, cwd=tmp_path) as killed,
+                view("--out", "ended.rrd", "--config", config, cwd=tmp_path) as ended,
             ):
                 wait_until(lambda: _drawn(tmp_path, ".killed*.rrd"), "one draws")
                 wait_until(lambda: _drawn(tmp_path, ".ended*.rrd"), "and the other")
@@ -151,7 +151,7 @@ def test_served_on_loopback_until_it_is_told_to_end(tmp_path: Path) -> None:
 @pytest.mark.processes
 def test_on_a_full_disk_there_is_no_file(tmp_path: Path) -> None:
     recording = write(tmp_path / "walk.mcap", foreseen(1.0))
-    with view(str(recording), "--save", "full.rrd", cwd=tmp_path, limit_bytes=200_000) as process:
+    with view(str(recording), "--out", "full.rrd", cwd=tmp_path, limit_bytes=200_000) as process:
         _, said = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 2
     assert said.splitlines() == ["surefoot: full.rrd: could not be written whole; is the disk full?"]
@@ -168,7 +168,7 @@ def test_a_viewer_that_dies_is_no_quiet_end_and_keeps_its_statistics(tmp_path: P
     with pytest.raises(SurefootError, match="ended at once") as error:
         Viewer(program, free_ports(1)[0], [])
     assert '"analytics_enabled": false' in str(error.value)
-    assert "--save FILE.rrd" in str(error.value)
+    assert "--out FILE.rrd" in str(error.value)
 
 
 def _drawn(folder: Path, pattern: str) -> bool:

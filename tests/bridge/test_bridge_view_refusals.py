@@ -41,7 +41,7 @@ def test_recordings_that_show_nothing(
     path = tmp_path / "bad.mcap"
     if content is not None:
         path.write_bytes(content)
-    assert said in refused(capsys, path, "--save", tmp_path / "out.rrd")
+    assert said in refused(capsys, path, "--out", tmp_path / "out.rrd")
     assert [left.name for left in tmp_path.iterdir()] == ([] if content is None else ["bad.mcap"])
 
 
@@ -50,14 +50,14 @@ def test_a_recording_of_nothing_at_all(tmp_path: Path, capsys: pytest.CaptureFix
     from bridge.topics import TOPICS
 
     BagWriter(tmp_path / "empty.mcap", "surefoot", TOPICS).finish()
-    assert "holds no message" in refused(capsys, tmp_path / "empty.mcap", "--save", tmp_path / "out.rrd")
+    assert "holds no message" in refused(capsys, tmp_path / "empty.mcap", "--out", tmp_path / "out.rrd")
     assert not (tmp_path / "out.rrd").exists()
 
 
 def test_a_recording_cut_off_is_shown_as_far_as_it_goes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     whole = write(tmp_path / "walk.mcap", walk(2.0)).read_bytes()
     (tmp_path / "cut.mcap").write_bytes(whole[: 2 * len(whole) // 3])
-    assert main(["view", str(tmp_path / "cut.mcap"), "--save", str(tmp_path / "cut.rrd")]) == 0
+    assert main(["view", str(tmp_path / "cut.mcap"), "--out", str(tmp_path / "cut.rrd")]) == 0
     assert "not whole: cut off after" in capsys.readouterr().err
     assert len(Rrd(tmp_path / "cut.rrd").drawn("/series/stiffening", "scalars")) >= 50
 
@@ -65,12 +65,12 @@ def test_a_recording_cut_off_is_shown_as_far_as_it_goes(tmp_path: Path, capsys: 
 def test_where_the_file_cannot_go(recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     taken = tmp_path / "taken.rrd"
     taken.write_bytes(b"mine")
-    assert "the name is taken; --overwrite replaces it" in refused(capsys, recording, "--save", taken)
+    assert "the name is taken; --force replaces it" in refused(capsys, recording, "--out", taken)
     assert taken.read_bytes() == b"mine"
-    assert "end in .rrd" in refused(capsys, recording, "--save", tmp_path / "out.mcap")
-    assert "cannot be written: No such file" in refused(capsys, recording, "--save", tmp_path / "no" / "out.rrd")
+    assert "end in .rrd" in refused(capsys, recording, "--out", tmp_path / "out.mcap")
+    assert "cannot be written: No such file" in refused(capsys, recording, "--out", tmp_path / "no" / "out.rrd")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["taken.rrd", "walk.mcap"]
-    assert main(["view", str(recording), "--save", str(taken), "--overwrite"]) == 0
+    assert main(["view", str(recording), "--out", str(taken), "--force"]) == 0
     assert Rrd(taken).drawn("/series/stiffening", "scalars")
 
 
@@ -85,7 +85,7 @@ def test_without_the_extra(
         return real(name)
 
     monkeypatch.setattr("bridge.view.extra.importlib.import_module", missing)
-    said = refused(capsys, recording, "--save", "out.rrd")
+    said = refused(capsys, recording, "--out", "out.rrd")
     assert said == "surefoot: surefoot view needs the package 'rerun-sdk': pip install 'surefoot[view]'"
 
 
@@ -96,7 +96,7 @@ def test_without_a_display(
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     said = refused(capsys, recording)
     assert "no display" in said
-    assert "--save FILE.rrd" in said
+    assert "--out FILE.rrd" in said
 
 
 def test_nothing_to_show_on(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -118,7 +118,7 @@ def test_video_lies_under_the_keypoints_it_was_seen_with(recording: Path, video:
     from PIL import Image
 
     out = tmp_path / "out.rrd"
-    assert main(["view", str(recording), "--save", str(out), "--video", str(video), "--crop", "10,0,320,240"]) == 0
+    assert main(["view", str(recording), "--out", str(out), "--video", str(video), "--crop", "10,0,320,240"]) == 0
     frames = Rrd(out).drawn("/image/frame", "blob")
     assert len(frames) == 12
     for index, row in enumerate(frames):
@@ -131,7 +131,7 @@ def test_video_lies_under_the_keypoints_it_was_seen_with(recording: Path, video:
 def test_video_can_be_shifted(recording: Path, video: Path, tmp_path: Path) -> None:
     out = tmp_path / "out.rrd"
     crop = ["--video", str(video), "--crop", "0,0,320,240", "--video-offset", "0.1"]
-    assert main(["view", str(recording), "--save", str(out), *crop]) == 0
+    assert main(["view", str(recording), "--out", str(out), *crop]) == 0
     stamps = [row.stamp_ns for row in Rrd(out).drawn("/image/frame", "blob")]
     assert abs(stamps[0] - START_NS - NS // 10) < 10
     assert all(0 < later - sooner < NS / 29 for sooner, later in itertools.pairwise(stamps))
@@ -140,9 +140,9 @@ def test_video_can_be_shifted(recording: Path, video: Path, tmp_path: Path) -> N
 def test_video_of_another_size(
     recording: Path, video: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    said = refused(capsys, recording, "--save", tmp_path / "out.rrd", "--video", video)
+    said = refused(capsys, recording, "--out", tmp_path / "out.rrd", "--video", video)
     assert "its pictures are 340x240, the keypoints are in 320x240; --crop" in said
     assert not list(tmp_path.glob("*.rrd")) + list(tmp_path.glob(".*.rrd"))  # it had been begun
-    assert "there is none" in refused(capsys, recording, "--save", tmp_path / "out.rrd", "--crop", "0,0,10,10")
-    assert "no such video" in refused(capsys, recording, "--save", tmp_path / "out.rrd", "--video", tmp_path / "no.mp4")
+    assert "there is none" in refused(capsys, recording, "--out", tmp_path / "out.rrd", "--crop", "0,0,10,10")
+    assert "no such video" in refused(capsys, recording, "--out", tmp_path / "out.rrd", "--video", tmp_path / "no.mp4")
     assert not (tmp_path / "out.rrd").exists()

@@ -9,7 +9,6 @@ from typing import Annotated
 
 import torch
 import typer
-from rich.console import Console
 
 from anticipation.training import simulated
 from anticipation.training.clips import data_folder
@@ -27,11 +26,11 @@ from anticipation.training.report.folder import (
     read_experiment,
     render,
     stored_predictions,
-    write_json,
 )
 from anticipation.training.report.page import PAGE
+from bridge.command_line.options import ConfigOption, DataOption, JsonOption, SeedOption, SetOption
+from bridge.command_line.output import STDOUT, note, require_writable, result_console, write_json
 from bridge.config.load import load_config
-from bridge.errors import SurefootError
 
 
 class Protocol(StrEnum):
@@ -51,20 +50,30 @@ class Keypoints(StrEnum):
 
 
 def evaluate(
-    data: Annotated[
-        Path | None,
-        typer.Option("--data", envvar="SUREFOOT_DATA", help="Folder of the research data.", show_default=False),
-    ] = None,
+    data: DataOption = None,
     protocol: Annotated[
         Protocol, typer.Option(help="Split by recording, as the paper may have, or across data sets.")
     ] = Protocol.GROUPED,
-    report: Annotated[Path | None, typer.Option(help="Folder for page, pictures, predictions and checkpoints.")] = None,
-    stored: Annotated[
-        Path | None, typer.Option("--from", help="Compute and draw again from a report's folder; nothing is trained.")
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="FOLDER",
+            help="Folder of the report: page, pictures, predictions and checkpoints.",
+            show_default=False,
+        ),
     ] = None,
-    json_file: Annotated[Path | None, typer.Option("--json", help="Write every number to this file.")] = None,
+    stored: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            metavar="FOLDER",
+            help="Compute and draw again from a report's folder; nothing is trained.",
+            show_default=False,
+        ),
+    ] = None,
     folds: Annotated[int, typer.Option(min=2, max=24, help="Folds, divided by recording.")] = 5,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of folds, draws and weights.")] = 0,
+    seed: SeedOption = 0,
     recipe: Annotated[
         RecipeName, typer.Option(help="Networks and how they learn: the shipped ones, or others.")
     ] = RecipeName.SUREFOOT,
@@ -81,37 +90,39 @@ def evaluate(
             show_default="live, but not with --from",
         ),
     ] = None,
-    config: Annotated[Path | None, typer.Option(help="Configuration of the live pass; default: built-in.")] = None,
-    settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="SECTION.KEY=VALUE", help="Override one value; repeatable.")
-    ] = None,
     experiments: Annotated[
         list[Path] | None,
         typer.Option("--experiment", metavar="FILE.json", help="Table measured apart, for the page; repeatable."),
     ] = None,
     clips: Annotated[
         Path | None,
-        typer.Option("--simulated", help="Folder of `surefoot clips` to learn from too.", show_default=False),
+        typer.Option(
+            "--simulated", metavar="FOLDER", help="Folder of `surefoot clips` to learn from too.", show_default=False
+        ),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="A few small fits, to see that everything runs.")] = False,
+    config: ConfigOption = None,
+    set_: SetOption = None,
+    json: JsonOption = None,
 ) -> None:
     """Measure how well recordings are foreseen that no network has seen.
 
-    Prints the main tables. With --report, writes page, pictures, numbers (PROTOCOL.json), what the networks said of
+    Prints the main tables. With --out, writes page, pictures, numbers (PROTOCOL.json), what the networks said of
     every clip (PROTOCOL.npz) and the networks; several protocols may share a folder, and one page shows them all.
 
-    Example: surefoot evaluate --protocol grouped --report runs/report
+    Example: surefoot evaluate --protocol grouped --out runs/report
 
-    Draw again, without training: surefoot evaluate --from runs/report --report runs/report
+    Draw again, without training: surefoot evaluate --from runs/report --out runs/report
     """
-    parsed = load_config(config, settings or [])
+    parsed = load_config(config, set_ or [])
     told = [read_experiment(path) for path in experiments or []]
-    for path in (json_file, None if report is None else report / PAGE):
-        if path is not None:
-            _writable(path)
+    if json is not None:
+        require_writable(json)
+    if out is not None:
+        require_writable(out / PAGE, "--out")
     torch.set_num_threads(1)  # more give other sums, and on a busy machine no speed
     with TemporaryDirectory() as scratch, progress_bars() as progress:
-        place = stored or report or Path(scratch)
+        place = stored or out or Path(scratch)
 
         def study(seed: int, keypoints: str) -> Study:
             plan = plan_for(recipe, seed, quick, epochs)
@@ -127,14 +138,15 @@ def evaluate(
             made = stored_predictions(stored, protocol.value)
             if live:
                 made = observed(made, study(int(made.meta["seed"]), str(made.meta["keypoints"])))
-        if live if stored is not None else report is not None:
+        if live if stored is not None else out is not None:
             records.save(made, predictions_path(place, protocol.value))
     results = results_of(made)
-    show(results, Console() if Console().is_terminal else Console(width=140))
-    if json_file is not None:
-        write_json(results, json_file)
-    if report is not None:
-        Console(stderr=True).print(f"report: {render(place, report, told)}")
+    if json is not None:
+        write_json(json, results)
+    if json != STDOUT:
+        show(results, result_console())
+    if out is not None:
+        note(f"report: {render(place, out, told)}")
 
 
 def _run(study: Study, protocol: Protocol, folds: int) -> Predictions:
@@ -143,17 +155,3 @@ def _run(study: Study, protocol: Protocol, folds: int) -> Predictions:
     if protocol is Protocol.PAPER:
         return paper(study)
     return cross(study)
-
-
-def _writable(path: Path) -> None:
-    """Make the folder of an output file, before hours are spent on its content.
-
-    Raises:
-        SurefootError: it cannot be made, or the path is a folder.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SurefootError(f"cannot write '{path}': {error.strerror}") from error
-    if path.is_dir():
-        raise SurefootError(f"cannot write '{path}': it is a folder")

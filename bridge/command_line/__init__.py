@@ -1,0 +1,1 @@
+"""What all commands share: their options, where their output goes, what the shell completes."""
