@@ -61,6 +61,9 @@ class SourceConfig(Section):
     `module:name` or `file.py:name`; "" = not set."""
     crop_px: tuple[int, ...] = ()
     """Part of each image that is used: x, y, width, height; [] = the whole image."""
+    latency_s: float = Field(default=0.0, ge=0, le=0.5)
+    """How long before its arrival a frame of a camera or stream was exposed, as you measured it; stamps are put back
+    by this much, so that its age is not taken for less than it is."""
     paced: bool = True
     """Files are played in real time; false: as fast as they can be processed, which no reader on the wire accepts."""
     fps_hz: float = Field(default=30.0, ge=1, le=240)

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from bridge.clock import Clock
+from bridge.clock import Clock, nanoseconds
 from bridge.errors import SourceError
 from perception.extras import load_opencv
 from perception.sources.frame import Frame
@@ -35,14 +35,28 @@ class Capture(Protocol):
 class Camera:
     """A `Source` of live frames.
 
-    OpenCV tells no exposure time, so a frame is stamped when it arrives. Frames
-    nobody took are dropped: the newest counts. A camera that stops answering is
+    OpenCV tells no exposure time, so a frame is stamped when it arrives, less the
+    delay that was measured. Frames nobody took are dropped: the newest counts. A camera that stops answering is
     opened again every second; meanwhile there are no frames, and the reader sees
     their age grow.
     """
 
-    def __init__(self, name: str, open_capture: Callable[[], Capture], crop: Crop | None, clock: Clock) -> None:
+    def __init__(
+        self,
+        name: str,
+        open_capture: Callable[[], Capture],
+        crop: Crop | None,
+        clock: Clock,
+        latency_s: float = 0.0,
+    ) -> None:
         """Open the camera and wait for its first frame.
+
+        Args:
+            name: what messages call it.
+            open_capture: opens it, again after every failure.
+            crop: part of each image that is used.
+            clock: stamps the frames.
+            latency_s: from exposure to arrival [s].
 
         Raises:
             SourceError: it does not open or gives no frame, or the crop does not fit.
@@ -51,6 +65,7 @@ class Camera:
         self._open_capture = open_capture
         self._crop = crop
         self._clock = clock
+        self._latency_ns = nanoseconds(latency_s)
         self._newest: Frame | None = None
         self._fault: SourceError | None = None
         self._lock = threading.Lock()
@@ -125,7 +140,7 @@ class Camera:
         read, bgr = capture.read()
         if not read:
             return False
-        stamp_ns = self._clock.now_ns()
+        stamp_ns = self._clock.now_ns() - self._latency_ns
         image = to_rgb(bgr, self._crop, self._name)
         with self._lock:
             self._newest = Frame(stamp_ns, image.shape[1], image.shape[0], image, ())
@@ -133,7 +148,7 @@ class Camera:
         return True
 
 
-def open_camera(address: int | str, crop: Crop | None, clock: Clock) -> Camera:
+def open_camera(address: int | str, crop: Crop | None, clock: Clock, latency_s: float = 0.0) -> Camera:
     """Open camera number or stream URL `address`.
 
     Raises:
@@ -147,4 +162,4 @@ def open_camera(address: int | str, crop: Crop | None, clock: Clock) -> Camera:
         return capture
 
     name = f"camera:{address}" if isinstance(address, int) else address
-    return Camera(name, open_capture, crop, clock)
+    return Camera(name, open_capture, crop, clock, latency_s)

@@ -32,7 +32,7 @@ def open_source(spec: str, config: SourceConfig, clock: Clock, options: Mapping[
 
     Args:
         spec: `FILE.npz:CLIP[/ARRAY]`, a video file, a folder of images, `camera:N`, a URL, or `module:name`.
-        config: crop, pacing, and what files may lack.
+        config: crop, pacing, a camera's delay, and what files may lack.
         clock: stamps the frames of cameras.
         options: of the role, for a source of one's own.
 
@@ -51,9 +51,9 @@ def open_source(spec: str, config: SourceConfig, clock: Clock, options: Mapping[
         clip = read_clip(Path(npz["file"]), npz["clip"] or "", config)
         return Playback(spec, stills(clip), paced=config.paced)
     if (camera := _CAMERA.match(spec)) is not None:
-        return open_camera(int(camera["number"]), crop, clock)
+        return open_camera(int(camera["number"]), crop, clock, config.latency_s)
     if _URL.match(spec):
-        return open_camera(spec, crop, clock)
+        return open_camera(spec, crop, clock, config.latency_s)
     if (plugin := parse_plugin(spec)) is not None and plugin.place != "camera":
         if crop is not None:
             raise SourceError(f"source '{spec}': a crop is not applied to a source of your own; cut its images there")

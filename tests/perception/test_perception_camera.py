@@ -58,6 +58,17 @@ def test_the_newest_frame_is_given_once_with_its_arrival() -> None:
     assert capture.released.is_set()
 
 
+def test_a_measured_delay_is_taken_off_the_stamp() -> None:
+    capture, clock = FakeCapture(), ManualClock(7 * NS)
+    capture.images.put(picture(1))
+    camera = Camera("fake", lambda: capture, None, clock, latency_s=0.08)
+    frame = camera.next(0)
+    assert frame is not None
+    assert frame.stamp_ns == 7 * NS - 80_000_000
+    capture.images.put(None)
+    camera.close()
+
+
 def test_a_camera_that_does_not_open_or_gives_nothing_is_said() -> None:
     with pytest.raises(SourceError, match="fake: does not open"):
         Camera("fake", lambda: FakeCapture(opened=False), None, ManualClock())
