@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from bridge.assess.run import Assessment
+from bridge.assess.spread import spread
 from bridge.colours import FAINT, FALL, INK, STABLE, STATE_COLOUR, TRANSIENT
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import SurefootError
@@ -187,30 +188,6 @@ def _thresholds(axes: Any, lines: Sequence[Threshold]) -> None:
             annotation_clip=False,
             arrowprops={"arrowstyle": "-", "color": line.colour, "linewidth": 0.6, "shrinkA": 0.0, "shrinkB": 0.0},
         )  # fmt: skip
-
-
-def spread(places: Sequence[float], gap: float) -> list[float]:
-    """Return ascending `places` in [0, 1] moved as little as it takes for them to be `gap` apart.
-
-    Neighbours that are too near move apart around their mean.
-    """
-    groups: list[list[float]] = []
-    for place in places:
-        groups.append([place])
-        while len(groups) > 1 and _centre(groups[-1]) - _centre(groups[-2]) < 0.5 * gap * (
-            len(groups[-1]) + len(groups[-2])
-        ):
-            last = groups.pop()
-            groups[-1].extend(last)
-    moved: list[float] = []
-    for group in groups:
-        first = _centre(group) - 0.5 * gap * (len(group) - 1)
-        moved.extend(first + gap * index for index in range(len(group)))
-    return moved
-
-
-def _centre(group: Sequence[float]) -> float:
-    return sum(group) / len(group)
 
 
 def _legend(axes: Any, columns: int) -> None:

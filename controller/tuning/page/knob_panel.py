@@ -10,13 +10,15 @@ from nicegui.events import ValueChangeEventArguments
 from controller.tuning.page.draft import Draft, Entered
 from controller.tuning.page.knobs import GROUPS, Knob
 
+Told = Callable[[str, Entered], None]  # key and new value
+Heard = Callable[[ValueChangeEventArguments[float | None]], None]
 DIGITS = 6  # a slider's steps are decimal fractions, its floats are not
 
 
 class KnobPanel:
     """Sliders and fields of every threshold; tells `changed(key, value)` what a person sets."""
 
-    def __init__(self, draft: Draft, changed: Callable[[str, Entered], None]) -> None:
+    def __init__(self, draft: Draft, changed: Told) -> None:
         self._changed = changed
         self._quiet = False  # while the page itself sets a value
         self._rows: dict[str, _Row] = {}
@@ -52,7 +54,7 @@ class _Slider(ui.slider):
 
 
 class _Row:
-    def __init__(self, knob: Knob, draft: Draft, changed: Callable[[str, Entered], None]) -> None:
+    def __init__(self, knob: Knob, draft: Draft, changed: Told) -> None:
         self._knob = knob
         value = draft.values[knob.key]
         number = 0.0 if value is None else value
@@ -95,8 +97,8 @@ class _Row:
     def blame(self, blamed: bool) -> None:
         self._frame.classes(add="refused" if blamed else "", remove="" if blamed else "refused")
 
-    def _typed(self, changed: Callable[[str, Entered], None]) -> Callable[[ValueChangeEventArguments[float | None]], None]:
+    def _typed(self, changed: Told) -> Heard:
         return lambda event: changed(self._knob.key, event.value)
 
-    def _dragged(self, changed: Callable[[str, Entered], None]) -> Callable[[ValueChangeEventArguments[float | None]], None]:
-        return lambda event: changed(self._knob.key, round(event.value, DIGITS))
+    def _dragged(self, changed: Told) -> Heard:
+        return lambda event: changed(self._knob.key, round(event.value or 0.0, DIGITS))

@@ -22,7 +22,7 @@ class Tiles:
             self._caught = _Tile("falls caught", "caught")
             self._lead = _Tile("median lead", "lead")
             self._needless = _Tile("needless", "needless")
-        self._progress = ui.label("counting …").classes("counting").mark("counting")
+        self._progress = ui.label("counting …").classes("counting").mark("counting").props("data-progress")
 
     def show(self, now: Outcome, file: Outcome) -> None:
         """Show the counts of the page's setting, and what the file's are where they differ."""

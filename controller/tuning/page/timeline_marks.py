@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from bridge.assess.plot import spread
+from bridge.assess.spread import spread
 from bridge.config.surefoot import SurefootConfig
 from controller.tuning.page.layout import Layout
 from controller.tuning.page.palette import Palette
