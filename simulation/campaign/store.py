@@ -12,6 +12,7 @@ from bridge.errors import SurefootError
 
 PLAN: Final = "campaign.json"
 TRIALS: Final = "trials"
+FORMAT: Final = 1  # of the files of a folder
 
 
 class Store:
@@ -24,9 +25,9 @@ class Store:
     def __init__(self, folder: Path, plan: Mapping[str, Any]) -> None:
         self.folder = folder
         self._trials = folder / TRIALS
-        file, wanted = folder / PLAN, dict(_plain(plan))
+        file, wanted = folder / PLAN, {"format": FORMAT, **_plain(plan)}
         if file.exists():
-            there = json.loads(file.read_text(encoding="utf-8"))
+            there = _read(file)
             for key, value in wanted.items():
                 if there.get(key) != value:
                     has, wants = _short(there.get(key)), _short(value)
@@ -53,6 +54,25 @@ class Store:
 
     def _file(self, name: str) -> Path:
         return self._trials / f"{name}.json"
+
+
+def _read(file: Path) -> dict[str, Any]:
+    """Return what a campaign's folder says of itself.
+
+    Raises:
+        SurefootError: it cannot be read, or another version of Surefoot wrote it.
+    """
+    try:
+        there = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise SurefootError(f"{file}: cannot be read ({error}); name another folder with --out") from error
+    found = there.get("format", 1) if isinstance(there, dict) else None  # before there were formats it was this one
+    if found != FORMAT:
+        raise SurefootError(
+            f"{file.parent} holds a campaign of format {found}, this Surefoot reads and writes {FORMAT}:"
+            " name another folder with --out"
+        )
+    return {**there, "format": FORMAT}
 
 
 def write(file: Path, value: Any) -> None:

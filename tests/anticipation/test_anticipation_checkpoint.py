@@ -114,7 +114,7 @@ def test_safetensors_of_someone_else(path):
 
 
 def test_another_version(path):
-    assert "format is 99, this version reads 2" in refusal(with_header(path, format=99))
+    assert "format is 99, this Surefoot reads up to 2: upgrade Surefoot" in refusal(with_header(path, format=99))
 
 
 def test_weights_from_before_the_centre_s_velocity_say_how_to_get_new_ones(path):
