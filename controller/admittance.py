@@ -5,6 +5,11 @@ s in [0, 1] is the stiffening. `D` only dissipates and follows `s` at once. Rais
 injects `dK d^2 / 2`, which a tank pays (Ferraguti, Secchi and Fantuzzi 2013); an empty tank holds K where it is.
 The anchor `p_a` is placed where the person is when K leaves zero, so that nothing jumps, and slips along when a
 walking person has stretched the spring to its reach: a plastic spring, which dissipates.
+
+Slack in the harness is height a person falls before anything holds them. So while stiffened the column takes it up:
+a force `D(s) s v_up (1 - load / (s F))`, which moves an unloaded column at `s v_up` and vanishes at a pull of `s F`,
+lifts it, and the height's anchor follows it up and never down, like a ratchet (`controller.take_up`). The tank pays for
+what the lifting gives beyond what the damper takes.
 """
 
 from __future__ import annotations
@@ -16,6 +21,7 @@ import numpy as np
 
 from bridge.config.admittance import AdmittanceConfig
 from bridge.messages import Floats
+from controller.take_up import TakeUp
 
 HEIGHT = 3
 YAW = 2
@@ -74,6 +80,7 @@ class Admittance:
         self._arrest: Floats = np.array(config.stiffness_arrest)
         self.hold: Floats = np.array([0.0, 0.0, 0.0, config.stiffness_hold_height_n_m])
         self._hold_height = config.height_hold_m
+        self._take_up = TakeUp(config, stage_s)
         self._reach_m, self._reach_rad = config.spring_reach_horizontal_m, config.spring_reach_yaw_rad
         self._refill = config.tank_refill_fraction
         self._initial_j, self._capacity_j = config.tank_initial_j, config.tank_capacity_j
@@ -92,6 +99,9 @@ class Admittance:
         """Let go of the spring, as after a stop: stiffening anew anchors it where the walker then is."""
         self.stiffness: Floats = np.zeros(4)
         self.anchor: Floats | None = None
+        self._anchored_m = 0.0  # height at which the anchor was placed
+        self._lift_n, self._lift_m_s = 0.0, 0.0  # of the present step
+        self._rise_m = 0.0  # how far the anchor may follow the column up
 
     def stages(self, profile: Floats, pose: Floats, velocity: Floats, force: Floats) -> AdmittanceStages:
         """Advance to the present stiffening and return the law over the horizon.
@@ -109,12 +119,15 @@ class Admittance:
             if self.anchor is not None:
                 self._pay(np.zeros(4), self._displacement(pose))
                 self.anchor = None
+            self._lift_n = self._lift_m_s = self._rise_m = 0.0
             onset, stiffness, total = rendered.onset, rendered.stiffness, rendered.total
             displacement = -self._coast(onset, velocity, force, hold_load) if onset else np.zeros(4)
         else:
             if self.anchor is None:
                 self.anchor = pose.copy()
+                self._anchored_m = float(pose[HEIGHT])
             self._slip(pose)
+            self._follow_up(float(pose[HEIGHT]))
             displacement = self._displacement(pose)
             stiffness, total = rendered.stiffness, rendered.total
             change = stiffness - self.stiffness
@@ -127,6 +140,12 @@ class Admittance:
             self._pay(stiffness[0], displacement)
         load = stiffness * displacement
         load[:, HEIGHT] += hold_load
+        if self.anchor is not None:
+            raised_m = float(self.anchor[HEIGHT]) - self._anchored_m
+            damping = rendered.damping[:, HEIGHT]
+            lift = self._take_up.lift(profile, damping, -float(force[HEIGHT]), raised_m, self.tank.energy_j)
+            load[:, HEIGHT] -= lift.force_n
+            self._lift_n, self._lift_m_s = float(lift.force_n[0]), float(lift.speed_m_s[0])
         return AdmittanceStages(self.mass, rendered.damping, total, load)
 
     def _rendered(self, profile: Floats) -> _Rendered:
@@ -152,7 +171,9 @@ class Admittance:
         spring = stages.load[0] + stages.stiffness[0] * (0.5 * span_s * mean)
         missing = self.mass * (after - before) / span_s + stages.damping[0] * mean + spring - force
         net = float(stages.damping[0] @ mean**2) - max(float(missing @ mean), 0.0)
+        net -= max(self._lift_n * float(mean[HEIGHT]), 0.0)
         self.tank.change(span_s * (self._refill * net if net > 0.0 else net))
+        self._rise_m = span_s * self._lift_m_s
 
     def _pay(self, stiffness: Floats, displacement: Floats) -> None:
         self.tank.change(-0.5 * float((stiffness - self.stiffness) @ displacement**2))
@@ -176,6 +197,17 @@ class Admittance:
         turned = math.remainder(pose[YAW] - self.anchor[YAW], 2.0 * math.pi)
         if abs(turned) > self._reach_rad:
             self.anchor[YAW] = pose[YAW] - math.copysign(self._reach_rad, turned)
+
+    def _follow_up(self, height_m: float) -> None:
+        """Let the height's anchor follow the column up as far as slack was taken up."""
+        assert self.anchor is not None
+        anchor = float(self.anchor[HEIGHT])
+        raised = min(height_m, anchor + self._rise_m)
+        self._rise_m = 0.0
+        if raised > anchor:
+            released = (height_m - anchor) ** 2 - (height_m - raised) ** 2
+            self.tank.change(0.5 * float(self.stiffness[HEIGHT]) * released)
+            self.anchor[HEIGHT] = raised
 
     def _coast(self, stage: int, velocity: Floats, force: Floats, hold_load: float) -> Floats:
         """Return how far the free walker moves until `stage`: there the spring will be anchored."""

@@ -62,6 +62,15 @@ class AdmittanceConfig(Section):
     height_hold_m: float = Field(default=1.0, gt=0, le=3)
     """Height of the interface above the floor in free walking [m]; must lie within the column's stroke."""
 
+    take_up_force_n: float = Field(default=120.0, ge=0, le=1000)
+    """Pull up to which a fully stiffened column rises to take up the harness's slack [N]; 0 leaves the slack."""
+
+    take_up_speed_m_s: float = Field(default=0.2, gt=0, le=1)
+    """Speed at which it rises, fully stiffened and without load [m/s]."""
+
+    take_up_reach_m: float = Field(default=0.06, ge=0, le=0.3)
+    """Highest that it rises above where stiffening began [m]."""
+
     spring_reach_horizontal_m: float = Field(default=0.15, gt=0, le=2)
     """How far the horizontal spring stretches before its anchor slips along [m]: bounds the pull on who walks on."""
 

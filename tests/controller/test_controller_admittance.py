@@ -51,7 +51,7 @@ def test_more_stiffening_is_never_softer(pair: list[float]) -> None:
 
 
 def test_anchor_is_placed_without_a_force() -> None:
-    law = admittance()
+    law = admittance(AdmittanceConfig(take_up_force_n=0.0))
     law.stages(flat(0.0), pose(2.0, 1.0, 0.3, 0.9), np.zeros(4), np.zeros(4))
     now = law.stages(flat(0.7), pose(2.1, 1.1, 0.4, 0.9), np.zeros(4), np.zeros(4))
     assert law.anchor is not None

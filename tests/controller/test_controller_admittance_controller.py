@@ -71,7 +71,7 @@ def spring_response(mass: float, damping: float, stiffness: float, force: float,
 
 @pytest.mark.parametrize(("axis", "s"), [(3, 0.0), *((axis, s) for axis in range(4) for s in (0.4, 1.0))])
 def test_constant_stiffening_is_the_stated_mass_spring_and_damper(axis: int, s: float) -> None:
-    loop = Loop(mpc=SHIPPED)
+    loop = Loop(admittance=AdmittanceConfig(take_up_force_n=0.0), mpc=SHIPPED)
     loop.run(0.1, np.zeros(6), s)
     start = loop.pose.copy()
     times = PERIOD_S * np.arange(1, 51)
@@ -160,7 +160,7 @@ def test_stiffening_foreseen_never_makes_the_present_softer(seed: int) -> None:
     wrench[list(WRENCH_AXES)] = random.uniform(-1, 1, 4) * [30, 30, 5, 150]
     commands = []
     for profile in (later, np.full(20, now)):
-        loop = Loop(mpc=SHIPPED)
+        loop = Loop(admittance=AdmittanceConfig(take_up_force_n=0.0), mpc=SHIPPED)
         loop.run(0.5, wrench, now)
         moving = np.sign(loop.velocity)
         commands.append(loop.step(wrench, profile))
