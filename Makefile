@@ -6,13 +6,17 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
-.PHONY: demo test lint format docs pictures bench properties mutate faults fuzz soak clean
+.PHONY: demo test test-docs lint format docs pictures bench properties mutate faults fuzz soak clean
 
 demo: $(VENV)/.base
 	$(BIN)/surefoot demo
 
 test: $(VENV)/.dev
 	$(BIN)/python -m pytest
+
+# Every command in README and docs that `make test` only parses, because it takes long: about twenty minutes.
+test-docs: $(VENV)/.bench
+	$(BIN)/python -m pytest tests/documentation/test_documentation_commands.py tests/documentation/long_commands.py
 
 # The property tests of the controller with a hundred times as many examples: about ten minutes.
 properties: $(VENV)/.dev
@@ -27,6 +31,7 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/mypy examples
 
 format: $(VENV)/.dev
 	$(BIN)/ruff check --fix .

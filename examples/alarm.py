@@ -80,15 +80,15 @@ class Alarm:
         if not words:
             return
         bell = "" if self._state in CALM else "\a"
-        print(f"{bell}{words}: {self._reason}", flush=True)  # noqa: T201 (that is what it is for)
+        print(f"{bell}{words}: {self._reason}", flush=True)
         due = now_s - self._ran_s.get(self._state, -math.inf) >= self._every_s
         if self._command and due and self._state not in CALM:
             self._ran_s[self._state] = now_s
             try:
                 call = [*self._command, self._state.value, self._reason]
-                self._running.append(subprocess.Popen(call))  # noqa: S603 (whose terminal it is, chose it)
+                self._running.append(subprocess.Popen(call))
             except OSError as error:
-                print(f"alarm: {self._command[0]} does not run: {error.strerror}", file=sys.stderr)  # noqa: T201
+                print(f"alarm: {self._command[0]} does not run: {error.strerror}", file=sys.stderr)
 
     def status(self, now_ns: int) -> NodeStatus:
         """Return what `surefoot up` shows."""
