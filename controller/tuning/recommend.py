@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Final, NamedTuple
 
-import numpy as np
-
 from bridge.config.intervention import InterventionConfig
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import SurefootError
@@ -89,14 +87,6 @@ class Answer:
     def supported(self) -> bool:
         """Whether the recordings show, with 95 % confidence, that the budget is kept."""
         return self.bound_per_hour <= self.question.budget_per_hour
-
-    @property
-    def better(self) -> bool:
-        """Whether choosing beat the present values on recordings that had no say: better somewhere, worse in no count."""
-        new, old = self.judged, self.present.outcome
-        ours, theirs = np.nan_to_num(new.lead_median_s), np.nan_to_num(old.lead_median_s)
-        no_worse = new.caught >= old.caught and new.needless <= old.needless
-        return no_worse and (new.caught > old.caught or new.needless < old.needless or bool(ours > theirs))
 
 
 def recommend(

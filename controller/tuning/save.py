@@ -6,6 +6,7 @@ import os
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Final
 
@@ -55,6 +56,12 @@ def write_toml(
         raise SurefootError(f"{out}: cannot be written: {error.strerror}") from error
 
 
+def require_tomlkit() -> None:
+    """Raise `MissingExtraError` where the package that keeps comments is not installed."""
+    if find_spec("tomlkit") is None:
+        raise MissingExtraError("writing a configuration", "tomlkit", "tune")
+
+
 def tuned_text(source: Path | None, changes: Mapping[str, float | int], note: Sequence[str] = ()) -> str:
     """Return the text that `write_toml` writes.
 
@@ -62,11 +69,10 @@ def tuned_text(source: Path | None, changes: Mapping[str, float | int], note: Se
         ConfigError: `source` cannot be read or the result does not hold together.
         MissingExtraError: the package that keeps comments is not installed.
     """
-    try:
-        import tomlkit  # noqa: PLC0415 (an extra)
-        from tomlkit.exceptions import TOMLKitError  # noqa: PLC0415
-    except ImportError as error:
-        raise MissingExtraError("writing a configuration", "tomlkit", "tune") from error
+    require_tomlkit()
+    import tomlkit  # noqa: PLC0415 (an extra)
+    from tomlkit.exceptions import TOMLKitError  # noqa: PLC0415
+
     name = "defaults" if source is None else str(source)
     try:
         document: Any = tomlkit.parse("" if source is None else source.read_text(encoding="utf-8"))
