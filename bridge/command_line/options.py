@@ -78,7 +78,7 @@ SourceOption = Annotated[
         metavar="SPEC",
         autocompletion=completion.clips,
         show_default=False,
-        help="Keypoint file FILE.npz:CLIP, video file, image folder or camera.",
+        help="Keypoint file FILE.npz:CLIP, video file, image folder, camera, or code of your own: FILE.py:NAME.",
     ),
 ]
 CropOption = Annotated[

@@ -33,7 +33,7 @@ def up(
     crop: CropOption = None,
     estimator: Annotated[
         str | None,
-        typer.Option(metavar="NAME", autocompletion=completion.estimators, help="Pose estimator: movenet or yolo."),
+        typer.Option(metavar="NAME", autocompletion=completion.estimators, help="movenet, yolo or FILE.py:NAME."),
     ] = None,
     controller: ControllerOption = None,
     log: Annotated[str | None, typer.Option(metavar="FILE", help="What the logging controller writes.")] = None,

@@ -17,6 +17,7 @@ from typing import NamedTuple, Self
 
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import ConfigError, SurefootError
+from bridge.keys.identity import OBSERVER, identity_of
 from bridge.launch.logfile import LogFile
 
 BAD_INPUT = SurefootError.exit_code
@@ -91,7 +92,7 @@ class Launcher:
                     self._launch.modules[role],
                     *common,
                     *_option_words(given.get(role, {})),
-                    *_after_words(role, self._launch.roles),
+                    *_after_words(role, self._launch.roles, sealed=bool(config.bridge.keys)),
                 ],
                 LogFile(folder, role),
             )
@@ -206,9 +207,15 @@ class _Child:
         return ProcessState(self.role, pid, alive, self.total_restarts, self._exit_code, line, self.phase)
 
 
-def _after_words(role: str, roles: Iterable[str]) -> list[str]:
-    """What the source publishes is lost on those that do not listen yet, so it waits for them."""
-    return [word for other in roles if other != SOURCE for word in ("--after", other)] if role == SOURCE else []
+def _after_words(role: str, roles: Iterable[str], *, sealed: bool) -> list[str]:
+    """What the source publishes is lost on those that do not listen yet, so it waits for them.
+
+    Where certificates are asked for, one who may only observe cannot say that it is up.
+    """
+    if role != SOURCE:
+        return []
+    awaited = (other for other in roles if other != SOURCE and not (sealed and identity_of(other) == OBSERVER))
+    return [word for other in awaited for word in ("--after", other)]
 
 
 def _option_words(options: Mapping[str, str]) -> list[str]:

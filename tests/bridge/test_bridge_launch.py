@@ -6,6 +6,7 @@ import json
 import os
 import signal
 from collections.abc import Iterable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -70,6 +71,18 @@ def test_logs_that_cannot_be_written_are_named(tmp_path: Path) -> None:
     (tmp_path / "drive.log").mkdir()
     with pytest.raises(ConfigError, match=r"drive\.log: cannot be written"):
         LogFile(tmp_path, "drive").open()
+
+
+@pytest.mark.parametrize(
+    ("keys", "awaited"), [("", ["anticipation", "alarm"]), ("keys", ["anticipation"])], ids=["open", "certificates"]
+)
+def test_the_source_waits_for_those_who_can_say_that_they_are_up(tmp_path: Path, keys: str, awaited: list[str]) -> None:
+    """An observer's certificate does not let it; whoever waited for it would begin half a minute late."""
+    config = load_config(
+        None, [f"bridge.keys={keys}", "launch.modules.alarm=x", 'launch.roles=["perception", "anticipation", "alarm"]']
+    )
+    arguments = Launcher(config, log_dir=tmp_path)._children["perception"]._arguments
+    assert [word for before, word in pairwise(arguments) if before == "--after"] == awaited
 
 
 class TestPorts:
