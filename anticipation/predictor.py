@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Final, Self
 
 import numpy as np
@@ -17,6 +16,7 @@ from anticipation.mirror import mirrored
 from anticipation.motion import BASELINES, COORDINATES, HORIZON, ROWS, WINDOW
 from anticipation.outlook import FastOutlook
 from anticipation.quality import Quality, judge
+from anticipation.shipped import weights
 from anticipation.transient import fold
 from anticipation.window import PoseWindow
 from bridge.config.anticipation import AnticipationConfig
@@ -53,7 +53,7 @@ class Predictor:
         Raises:
             CheckpointError: it is missing or damaged.
         """
-        return cls(load(Path(config.checkpoint) if config.checkpoint else None), config)
+        return cls(load(weights(config.checkpoint)), config)
 
     @property
     def frames(self) -> int:

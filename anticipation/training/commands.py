@@ -23,7 +23,7 @@ from anticipation.training.journal import Journal
 from anticipation.training.log import Log, available
 from anticipation.training.networks import progress_bars
 from anticipation.training.own import read_own
-from anticipation.training.plan import Plan, RecipeName, plan_for
+from anticipation.training.plan import WITH_SIMULATED, Plan, RecipeName, plan_for
 from anticipation.training.run import Run
 from anticipation.training.samples import Track
 from anticipation.training.team import Team, joined
@@ -107,6 +107,7 @@ def train(
     if out.exists() and not force:
         raise SurefootError(f"--out {out}: the name is taken; --force replaces it")
     plan = plan_for(recipe, seed, quick, epochs)
+    plan = plan if clips is None or quick else plan.larger(WITH_SIMULATED)
     _one_thread()
     with joined(_device(device)) as (team, place):
         settings = _settings(plan, folds, seed, measured, own, clips, team, place)

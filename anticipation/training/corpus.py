@@ -22,11 +22,9 @@ DAILY_STRIDE: Final = 3  # daily activities last a minute: every third window sa
 MOCAP_STRIDE: Final = 2
 OUMVLP_CLIPS: Final = 2000  # sequences of a second taken of each estimator
 OWN_SHARE: Final = 0.2  # of a batch, where there are recordings of the user's own
-SIMULATED_MOTION: Final = 0.25  # beside 1 for all people: of the forecaster's batches, where there are simulated clips
-SIMULATED_EVENT: Final = (
-    0.3  # of the classifier's: windows in which a simulated fall is under way or half a second ahead
-)
-SIMULATED_CALM: Final = 0.2  # and the others
+SIMULATED_MOTION: Final = 0.6  # beside 1 for all people: of the forecaster's batches, where there are simulated clips
+SIMULATED_EVENT: Final = 1.0  # of the classifier's: windows with a simulated fall in them or half a second ahead
+SIMULATED_CALM: Final = 0.6  # and the others
 MOCAP_KEPT: Final = 0.15  # share of the mocap clips that no network learns from
 
 

@@ -46,6 +46,19 @@ class Plan:
             outlook=None if self.outlook is None else replace(self.outlook, seed=seed),
         )
 
+    def larger(self, times: float) -> Plan:
+        """Return the plan with so many times the draws in every epoch of the fits to people."""
+
+        def more(recipe: Recipe) -> Recipe:
+            return replace(recipe, draws=round(times * recipe.draws))
+
+        return replace(
+            self,
+            finetune=more(self.finetune),
+            classifier=more(self.classifier),
+            outlook=None if self.outlook is None else more(self.outlook),
+        )
+
     def lasting(self, epochs: int) -> Plan:
         """Return the plan with another number of epochs for the classifier."""
         return replace(self, classifier=replace(self.classifier, epochs=epochs))
@@ -109,6 +122,9 @@ def _small(plan: Plan, rate: float) -> Plan:
 
 
 QUICK: Final = {name: _small(plan, 3e-3) for name, plan in FULL.items()}
+
+
+WITH_SIMULATED: Final = 4.0  # times the draws: the simulated falls fill most of a batch, and are many
 
 
 def plan_for(recipe: str, seed: int, quick: bool, epochs: int | None = None) -> Plan:

@@ -36,7 +36,9 @@ class AnticipationConfig(Section):
     """`[anticipation]`: the networks, and which input is too poor to be used."""
 
     checkpoint: str = ""
-    """Path of the checkpoint (`.safetensors`); "" = the weights that come with the package."""
+    """Path of the checkpoint (`.safetensors`), or the name of weights that come with the package: "" = "default", which
+    know filmed people; "simulated" know people in the simulator's harness too, and what they call a fall begins earlier
+    (docs/simulation.md)."""
     forecaster: Literal["checkpoint", "zero_velocity", "constant_velocity"] = "checkpoint"
     """Forecast of the motion: the checkpoint's own, or one of the two that need no learning."""
     threads: int = Field(default=1, ge=1, le=64)

@@ -19,7 +19,7 @@ from anticipation.training.evaluation.recordings import read_recordings
 from anticipation.training.evaluation.records import Predictions
 from anticipation.training.evaluation.results import results_of
 from anticipation.training.networks import progress_bars
-from anticipation.training.plan import RecipeName, plan_for
+from anticipation.training.plan import WITH_SIMULATED, RecipeName, plan_for
 from anticipation.training.report.console import show
 from anticipation.training.report.folder import (
     predictions_path,
@@ -126,6 +126,7 @@ def evaluate(
 
         def study(seed: int, keypoints: str) -> Study:
             plan = plan_for(recipe, seed, quick, epochs)
+            plan = plan if clips is None or quick else plan.larger(WITH_SIMULATED)
             folder = data_folder(data)
             acted = () if clips is None else simulated.read(clips)
             corpus = read_corpus(folder, plan.mocap_clips, seed, parsed.perception.cleaning, simulated=acted)
