@@ -35,7 +35,8 @@ def answer(complete: Callable[[], object]) -> str:
     os.environ["COMP_WORDS"], os.environ["COMP_CWORD"] = shlex.join(words), str(position)
     word = words[position] if position < len(words) else ""
     has = max(word.rfind(sign) for sign in _BREAKS) + 1
-    return "".join(f"{line[has:]}\n" for line in _printed(complete).splitlines() if line.startswith(word[:has]))
+    lines = filter(None, _printed(complete).splitlines())
+    return "".join(f"{line[has:]}\n" for line in lines if line.startswith(word[:has]))
 
 
 def join_broken(words: Sequence[str], position: int) -> tuple[list[str], int]:
@@ -65,15 +66,12 @@ def settings(incomplete: str) -> list[str]:
     """Return `SECTION.KEY=` and, where the key is known, the values it may have, or its default."""
     from bridge.config.surefoot import SurefootConfig  # noqa: PLC0415 (loaded only when asked for)
 
-    offered: list[str] = []
-    for key, default, annotation in _keys(SurefootConfig(), ""):
-        if f"{key}=".startswith(incomplete):
-            offered.append(f"{key}=")
-        if incomplete.startswith(f"{key}="):
-            offered += [f"{key}={value}" for value in _values(default, annotation)]
-    if len(offered) == 1 and offered[0].endswith("="):  # two offers keep the shell from closing the word
-        return offered + settings(offered[0])
-    return offered
+    known = {f"{key}=": [f"{key}={value}" for value in _values(*field)] for key, *field in _keys(SurefootConfig(), "")}
+    written = [key for key in known if incomplete.startswith(key)]
+    if written:
+        return known[written[0]]
+    begun = [key for key in known if key.startswith(incomplete)]
+    return begun + known[begun[0]] if len(begun) == 1 else begun  # a single offer would close the word
 
 
 def roles(incomplete: str) -> list[str]:
