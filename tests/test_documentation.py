@@ -1,53 +1,21 @@
-"""README and docs name only commands, options, files and config keys that exist."""
+"""README and docs name only files and config keys that exist; their commands are executed in tests/documentation."""
 
 from __future__ import annotations
 
 import re
-import shlex
+import textwrap
 import tomllib
 from pathlib import Path
 
 import pytest
-import typer
 from pydantic import BaseModel
 
-from bridge.cli import COMMANDS, _load, main
 from bridge.config.load import parse_config
 from bridge.config.surefoot import SurefootConfig
+from bridge.topics import TOPICS
 
 REPO = Path(__file__).resolve().parent.parent
-PAGES = [REPO / "README.md", REPO / "CONTRIBUTING.md", *sorted((REPO / "docs").glob("*.md"))]
-LINES = sorted(
-    {
-        line.split("#")[0].strip()
-        for page in PAGES
-        for block in re.findall(r"```sh\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
-        for line in block.splitlines()
-        if re.match(r"\s*surefoot\s", line)
-    }
-)
-
-
-def test_there_is_something_to_check() -> None:
-    assert len(LINES) > 8
-
-
-@pytest.mark.parametrize("line", LINES)
-def test_commands_and_options_exist(
-    line: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "200")
-    words = shlex.split(re.sub(r"[\[\]]|\.\.\.", " ", line).split(">")[0].split("&&")[0].split("|")[0])
-    if words[1].startswith("--"):
-        assert main(words[1:]) == 0
-        return
-    assert words[1] in COMMANDS, line
-    group = isinstance(_load(COMMANDS[words[1]].target), typer.Typer)  # its options are those of its own commands
-    main([*words[1 : 3 if group else 2], "--help"])
-    page = capsys.readouterr().out
-    for word in words[2:]:
-        if word.startswith("--"):
-            assert re.search(rf"{re.escape(word)}\b", page), f"{words[1]} has no option {word}"
+PAGES = [REPO / "README.md", REPO / "CONTRIBUTING.md", *sorted((REPO / "docs").rglob("*.md"))]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
@@ -58,7 +26,7 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 
 TABLES = [
-    (page.name, text.replace("\n   ", "\n"))
+    (page.name, textwrap.dedent(text))
     for page in PAGES
     for text in re.findall(r"```toml\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
 ]
@@ -89,3 +57,17 @@ def test_config_keys_exist(page: Path) -> None:
         package = REPO / Path(*key.split(".")[:2])
         parents = {key, key.rsplit(".", 1)[0]}  # a table such as launch.modules has keys of its own
         assert parents & KNOWN or module.is_file() or package.is_dir(), f"{page.name} names {key}"
+
+
+def test_the_topics_of_the_wire_page_are_those_of_the_topic_table() -> None:
+    rows = re.findall(
+        r"^\| `surefoot/(\w+)` \| `([\w/]+)` \| (.*)$", (REPO / "docs" / "wire.md").read_text("utf-8"), re.M
+    )
+    said = {key: (ros_type, rest) for key, ros_type, rest in rows}
+    assert set(said) == {topic.key for topic in TOPICS}
+    for topic in TOPICS:
+        ros_type, rest = said[topic.key]
+        age = f"{topic.max_age_s:g} s" if topic.max_age_s >= 1 else f"{topic.max_age_s * 1e3:g} ms"
+        assert ros_type == topic.ros_type
+        assert f"| {topic.rate_hz:g} Hz | {age} |" in rest
+        assert ("every role" if topic.publisher == "*" else topic.publisher) in rest
