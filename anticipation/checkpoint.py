@@ -25,19 +25,19 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save as to_bytes
 from torch import Tensor, nn
 
+from anticipation.checkpoint_format import FORMAT, HEADER, read_header
 from anticipation.gait_state import CLASSIFIERS, DirectedGraphNetwork
 from anticipation.mirror import mirrored
 from anticipation.motion import BASELINES, FORECASTERS, HORIZON, WINDOW, Forecast
 from anticipation.outlook import Outlook
 from anticipation.quality import PoseStatistics
+from anticipation.shipped import DEFAULT
 from anticipation.transient import TransientPlane
 from bridge.errors import CheckpointError
 from bridge.messages import CLASSES, STEPS, Floats, frozen
 from perception.skeleton import NAMES
 
-FORMAT: Final = 2  # 1 knew nothing of the centre's velocity
-SHIPPED: Final = Path(__file__).parent / "weights" / "default.safetensors"
-_HEADER: Final = "surefoot"
+SHIPPED: Final = DEFAULT
 _NETWORKS: Final = ("forecaster", "classifier", "outlook")
 _OUTLOOKS: Final = {"outlook": Outlook}
 
@@ -116,7 +116,7 @@ def save(checkpoint: Checkpoint, path: Path, storage: Literal["float16", "float3
         header[part] = None if network is None else _describe(network)
         if isinstance(network, nn.Module):
             tensors |= {f"{part}/{name}": _stored(value, storage) for name, value in network.state_dict().items()}
-    write_whole(path, to_bytes(tensors, metadata={_HEADER: json.dumps(header)}))
+    write_whole(path, to_bytes(tensors, metadata={HEADER: json.dumps(header)}))
 
 
 def load(path: Path | None = None) -> Checkpoint:
@@ -156,22 +156,11 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
         raise CheckpointError(f"{path}: no such checkpoint")
     try:
         with safe_open(path, framework="pt") as file:
-            text = (file.metadata() or {}).get(_HEADER)
+            metadata = file.metadata()
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (no mapping)
     except (SafetensorError, OSError) as error:
         raise CheckpointError(f"{path}: not a whole safetensors file ({_one_line(error)})") from None
-    if text is None:
-        raise CheckpointError(f"{path}: a safetensors file, but not a checkpoint of Surefoot (no '{_HEADER}' header)")
-    try:
-        header = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise CheckpointError(f"{path}: header is not JSON ({error})") from None
-    if not isinstance(header, dict) or header.get("format") != FORMAT:
-        found = header.get("format") if isinstance(header, dict) else None
-        raise CheckpointError(
-            f"{path}: checkpoint format is {found}, this version reads {FORMAT}: make it again with `surefoot train`"
-        )
-    return header, tensors
+    return read_header(metadata, path), tensors
 
 
 def _require(path: Path, header: Mapping[str, Any], name: str, expected: object) -> None:

@@ -2,31 +2,30 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
 from typing import Final
 
 from safetensors import SafetensorError, safe_open
 
+from anticipation.checkpoint_format import read_header
+from anticipation.shipped import weights
 from anticipation.transient import TransientPlane
 from bridge.errors import CheckpointError
 
-SHIPPED: Final = Path(__file__).parent / "weights" / "default.safetensors"
 _PREFIX: Final = "plane/"
 
 
 def read_plane(checkpoint: str) -> TransientPlane:
-    """Return the plane in the file `checkpoint`; "" means the weights that come with the package.
+    """Return the plane in the file `checkpoint`, or of the weights of that name that come with the package.
 
     Raises:
         CheckpointError: missing, damaged, or without a plane.
     """
-    path = Path(checkpoint) if checkpoint else SHIPPED
+    path = weights(checkpoint)
     if not path.is_file():
         raise CheckpointError(f"{path}: no such checkpoint")
     try:
         with safe_open(path, framework="np") as file:
-            header = json.loads((file.metadata() or {})["surefoot"])
+            header = read_header(file.metadata(), path)
             names = [name for name in file.keys() if name.startswith(_PREFIX)]  # noqa: SIM118 (no mapping)
             arrays = {name.removeprefix(_PREFIX): file.get_tensor(name) for name in names}
         return TransientPlane.from_arrays(arrays, header["plane"]["features"])

@@ -76,5 +76,5 @@ def test_a_file_without_a_plane_is_named(tmp_path: Path) -> None:
     with pytest.raises(CheckpointError, match="not a whole safetensors file"):
         read_plane(str(tmp_path / "broken.safetensors"))
     save_file({"x": np.zeros(1)}, tmp_path / "other.safetensors")
-    with pytest.raises(CheckpointError, match="holds no transient plane"):
+    with pytest.raises(CheckpointError, match="not a checkpoint of Surefoot"):
         read_plane(str(tmp_path / "other.safetensors"))
