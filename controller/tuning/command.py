@@ -128,7 +128,7 @@ def tune(
             _save(answer, config, out, force=force)
     if serve:
         bench = Bench(
-            cases, loaded, file=config, save_to=out or config, force=force,
+            cases, loaded, file=config, save_to=out or config, overrides=set_ or [], force=force,
             candidates=_candidates(answer), by=by, budget_per_h=budget_per_hour,
         )  # fmt: skip
         return serve_page(bench, port)

@@ -3,29 +3,41 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from bridge.config.load import load_config
+from bridge.config.surefoot import SurefootConfig
 from controller.tuning.cases import Case, Fall, Horizons, stream
 from controller.tuning.page.bench import Bench, Candidate
-from controller.tuning.score import Outcome
+from controller.tuning.replay import replay
+from controller.tuning.score import Outcome, score
 
 FRAME_S = 1.0 / 30.0
+BUDGET_PER_H = 30.0
 
 
 def made_up(
-    name: str, length_s: float, falls_s: tuple[float, ...] = (), dips: tuple[tuple[float, float], ...] = ()
+    name: str,
+    length_s: float,
+    falls_s: tuple[float, ...] = (),
+    dips: tuple[tuple[float, float], ...] = (),
+    depth: float = 2.6,
+    slow_s: float = 0.25,
 ) -> Case:
-    """Return somebody who walks steadily, comes nearer the boundary by `dips` (when, how much), and falls."""
+    """Return somebody who walks steadily, comes nearer the boundary by `dips` (when, how much), and falls.
+
+    A fall ends 2 `depth` nearer, or past the boundary, and takes about `slow_s`.
+    """
     at_s = np.arange(round(length_s / FRAME_S)) * FRAME_S
     ahead_s = at_s[:, None] + np.arange(16) * FRAME_S
     distance = 2.6 + 0.3 * np.sin(2.0 * np.pi * ahead_s / 1.1)
-    for when_s, depth in dips:
-        distance -= depth * np.exp(-(((ahead_s - when_s) / 0.35) ** 2))
+    for when_s, nearer in dips:
+        distance -= nearer * np.exp(-(((ahead_s - when_s) / 0.35) ** 2))
     for when_s in falls_s:
-        distance -= 2.6 * (1.0 + np.tanh((ahead_s - when_s - 0.5) / 0.25))
+        distance -= depth * (1.0 + np.tanh((ahead_s - when_s - 0.5) / slow_s))
     fall = 0.5 * (1.0 - np.tanh((distance + 0.5) / 0.7))
     transient = 0.5 * (1.0 - fall) * (1.0 - np.tanh((distance - 1.2) / 0.6))
     stamps_ns = np.round(at_s * 1e9).astype(np.int64)
@@ -59,10 +71,51 @@ def candidates() -> list[Candidate]:
     ]
 
 
+def many_recordings() -> list[Case]:
+    """Return what makes a picture: falls after strides of all kinds, deeds of all kinds."""
+    draw = np.random.default_rng(7)
+    falls = [
+        made_up(
+            f"falls.npz:fall-{number:02d}",
+            8.0,
+            (float(draw.uniform(3, 6)),),
+            ((1.5, float(draw.uniform(0, 2))),),
+            float(draw.uniform(1.45, 2.4)),
+            float(draw.uniform(0.15, 0.5)),
+        )
+        for number in range(15)
+    ]
+    deeds = [
+        made_up(
+            f"daily.npz:deed-{number:02d}",
+            60.0,
+            (),
+            tuple((at_s + float(draw.uniform(-2, 2)), float(draw.uniform(1.5, 3.8))) for at_s in range(6, 58, 9)),
+        )
+        for number in range(8)
+    ]
+    return [recordings()[0], *falls, *deeds]
+
+
+def tried(cases: list[Case], config: SurefootConfig) -> list[Candidate]:
+    """Return settings at random with what they really come to."""
+    draw = np.random.default_rng(1)
+    found = []
+    for _ in range(16):
+        onset = round(float(draw.uniform(0.05, 0.65)), 2)
+        values = {"probability_onset": onset, "probability_full": round(onset + float(draw.uniform(0.1, 0.29)), 2)}
+        intervention = config.intervention.model_copy(update=values)
+        found.append(Candidate(values, score(replay(case, intervention, config.supervisor) for case in cases)))
+    kept = [each for each in found if each.outcome.per_hour <= BUDGET_PER_H]
+    best = max(kept, key=lambda each: each.outcome.caught)
+    return [replace(each, recommended=each is best) for each in found]
+
+
 if __name__ == "__main__":
     from controller.tuning.page.serve import serve
 
     config = Path(sys.argv[1])
-    raise SystemExit(
-        serve(Bench(recordings(), load_config(config), config, config, candidates=candidates(), budget_per_h=60.0), 0)
-    )
+    loaded = load_config(config)
+    shown = many_recordings() if "many" in sys.argv else recordings()
+    candidates_ = tried(shown, loaded) if "many" in sys.argv else candidates()
+    raise SystemExit(serve(Bench(shown, loaded, config, config, candidates=candidates_, budget_per_h=BUDGET_PER_H), 0))

@@ -47,6 +47,7 @@ class Bench:
     config: SurefootConfig  # as it stands in the file
     file: Path | None = None  # where it was read; from the first saving on, where it was saved
     save_to: Path | None = None
+    overrides: Sequence[str] = ()  # `--set` of the command line, on top of the file
     force: bool = False  # overwrite what is at `save_to` though it is not `file`
     candidates: Sequence[Candidate] = ()
     by: Intervening = Intervening.ARREST
@@ -112,4 +113,4 @@ class Bench:
         Raises:
             ConfigError: the file is gone or does not hold together.
         """
-        return self.config if self.file is None else load_config(self.file)
+        return self.config if self.file is None else load_config(self.file, self.overrides)

@@ -19,7 +19,7 @@ from controller.tuning.page.palette import DAY, NIGHT
 from controller.tuning.page.results import HappeningList, Tiles
 from controller.tuning.page.timeline_chart import timeline_options
 from controller.tuning.page.timeline_marks import PANELS
-from controller.tuning.page.tradeoff_chart import HEIGHT_PX, tradeoff_options
+from controller.tuning.page.tradeoff_chart import HEIGHT_PX, RECOMMENDED, tradeoff_options
 from controller.tuning.replay import Run
 from controller.tuning.score import score_one
 
@@ -52,7 +52,6 @@ class Board:
         self._layout, self._palette = Layout(wide=True), DAY
         self._asked_for: bool | None = None  # dark or not, as a person set it; None: as the system has it
         self._news = asyncio.Event()
-        self._complaint: ui.notification | None = None
         self._run: Run | None = None
         self._shown: InterventionConfig | None = None  # thresholds of the charts
         self._scores: Scores | None = None
@@ -79,7 +78,7 @@ class Board:
             ui.label("Surefoot").classes("brand")
             ui.label("tune").classes("brand-quiet")
             target = "no file to save to" if bench.save_to is None else str(bench.save_to)
-            self._status = ui.label(target).classes("target")
+            ui.label(f"\u200e{target}\u200e").classes("target")  # cut at its beginning, but read from left to right
             ui.space()
             ui.button(icon="contrast", on_click=self._toggle_dark).props('flat round dense aria-label="dark or light"')
             self._discard = ui.button("Discard", on_click=self._reset).props("flat no-caps").mark("discard")
@@ -95,7 +94,9 @@ class Board:
                 with ui.element("div").classes("card"):
                     ui.label("Trade-off over all recordings").classes("card-title")
                     if bench.candidates:
-                        ui.label("Click a candidate to set its thresholds.").classes("quiet")
+                        ui.label("Click a candidate to take its thresholds; the triangle is recommended.").classes(
+                            "quiet"
+                        )
                     self._tradeoff = ui.echart({}, on_point_click=self._take_candidate).classes("tradeoff")
                     self._tradeoff.style(f"height: {HEIGHT_PX}px").mark("tradeoff")
             with ui.element("aside").classes("knobs card"):
@@ -146,14 +147,10 @@ class Board:
         self._news.set()
 
     def _write(self) -> None:
-        if self._complaint is not None:
-            self._complaint.dismiss()
         try:
             done = self._bench.save(self._draft)
         except SurefootError as error:
-            self._complaint = ui.notification(
-                f"Nothing written: {error}", type="negative", multi_line=True, timeout=8, close_button="OK"
-            )
+            ui.notify(f"Nothing written: {error}", type="negative", multi_line=True, close_button="OK")
             return
         self._draft = Draft.of(self._bench.config)
         self._file_scores = None
@@ -276,8 +273,8 @@ class Board:
         if self._scores is None or self._file_scores is None:
             return
         candidates = [
-            words.point("recommended" if candidate.recommended else f"candidate {index + 1}", candidate.outcome)
-            for index, candidate in enumerate(self._bench.candidates)
+            words.point(RECOMMENDED if each.recommended else f"candidate {index + 1}", each.outcome)
+            for index, each in enumerate(self._bench.candidates)
         ]
         file, now = (
             words.point("as in the file", self._file_scores.outcome),

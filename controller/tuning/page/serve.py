@@ -9,8 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
-from rich.console import Console
-
+from bridge.command_line.output import note
 from bridge.errors import MissingExtraError, SurefootError
 from controller.tuning.page.bench import Bench
 from controller.tuning.page.guard import QUERY, Guard
@@ -75,7 +74,7 @@ def _run(bench: Bench, listening: socket.socket, key: str, address: str) -> None
     ui.add_css(STYLE, shared=True)
     ui.page("/", title="Surefoot tune", favicon="🦶")(page)
     app = FastAPI(openapi_url=None)
-    ui.run_with(app, tailwind=False, show_welcome_message=False, reconnect_timeout=10.0)
+    ui.run_with(app, tailwind=False, show_welcome_message=False, reconnect_timeout=120.0)
     config = uvicorn.Config(
         Guard(app, key),
         log_level="warning",
@@ -86,5 +85,5 @@ def _run(bench: Bench, listening: socket.socket, key: str, address: str) -> None
         timeout_graceful_shutdown=GRACE_S,
     )
     logging.getLogger("uvicorn.error").setLevel(logging.ERROR)
-    Console(stderr=True).print(f"open {address}   (Ctrl-C ends it)", soft_wrap=True, markup=False, highlight=False)
+    note(f"open {address}   (Ctrl-C ends it)")
     uvicorn.Server(config).run(sockets=[listening])

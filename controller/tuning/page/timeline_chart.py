@@ -5,6 +5,7 @@ The panels and colours are those of `surefoot assess --plot`, so that docs/tunin
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
@@ -49,6 +50,14 @@ class Curve(NamedTuple):
     colour: str
     dashed: bool = False  # of the future
     filled: bool = False
+
+
+class Range(NamedTuple):
+    """Of a vertical axis."""
+
+    low: float
+    high: float
+    step: float  # between two lines of the grid
 
 
 def timeline_options(
@@ -113,11 +122,13 @@ def _usable(run: Run) -> NDArray[np.bool_]:
     return np.array([fault == "" for fault in run.case.horizons.stream.faults], np.bool_)
 
 
-def _ranges(run: Run, lines: Sequence[Threshold]) -> list[tuple[float, float]]:
+def _ranges(run: Run, lines: Sequence[Threshold]) -> list[Range]:
     distance = run.case.horizons.distance[_usable(run)][:, [0, -1]]
     values = [*distance[np.isfinite(distance)].tolist(), *(line.value for line in lines), 0.0]
-    limits = float(np.floor(min(values))), float(np.ceil(max(values)) + (max(values) % 1 == 0))
-    return [limits if panel == DISTANCE else (0.0, 1.0) for panel in PANELS]
+    low, high = min(values), max(values)
+    step = 1.0 if high - low <= 4.0 else 2.0 if high - low <= 9.0 else 5.0
+    distances = Range(step * math.floor(low / step), step * math.ceil((high + 0.1) / step), step)
+    return [distances if panel == DISTANCE else Range(0.0, 1.0, 0.25) for panel in PANELS]
 
 
 def _time_axis(run: Run, panel: int, palette: Palette) -> dict[str, Any]:
@@ -130,12 +141,9 @@ def _time_axis(run: Run, panel: int, palette: Palette) -> dict[str, Any]:
     return found
 
 
-def _value_axis(panel: int, limits: tuple[float, float], palette: Palette) -> dict[str, Any]:
-    found = axis(palette, type="value", gridIndex=panel, min=limits[0], max=limits[1], show=panel != BAND)
-    found["axisLine"] = {"show": False}
-    found["interval"] = 0.25 if panel != DISTANCE else max(1, round((limits[1] - limits[0]) / 4))
-    found["axisPointer"] = {"show": False}
-    return found
+def _value_axis(panel: int, span: Range, palette: Palette) -> dict[str, Any]:
+    found = axis(palette, type="value", gridIndex=panel, min=span.low, max=span.high, interval=span.step)
+    return {**found, "show": panel != BAND, "axisLine": {"show": False}, "axisPointer": {"show": False}}
 
 
 def _zoom(palette: Palette, layout: Layout) -> dict[str, Any]:

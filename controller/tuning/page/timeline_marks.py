@@ -61,7 +61,7 @@ def thresholds(config: SurefootConfig, palette: Palette) -> dict[int, list[Thres
 def marks(
     run: Run,
     lines: dict[int, list[Threshold]],
-    ranges: Sequence[tuple[float, float]],
+    ranges: Sequence[tuple[float, float, float]],
     palette: Palette,
     layout: Layout,
     touched: str,
@@ -71,7 +71,7 @@ def marks(
     Args:
         run: the recording.
         lines: the thresholds of each panel.
-        ranges: least and largest value of each panel.
+        ranges: least and largest value of each panel, and the step between.
         palette: the colours.
         layout: the measures.
         touched: key of the threshold to draw bold.
@@ -82,7 +82,7 @@ def marks(
     for panel in PANELS:
         shown = [band for band in found if panel == BAND or band.state != "FOLLOW"]
         areas = [_area(band, panel, run.case.duration_s, palette, layout) for band in shown]
-        across = _across(lines.get(panel, ()), ranges[panel], palette, layout, touched)
+        across = _across(lines.get(panel, ()), ranges[panel][:2], palette, layout, touched)
         series.append(
             {
                 "type": "line",

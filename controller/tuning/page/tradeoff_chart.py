@@ -10,6 +10,7 @@ from controller.tuning.page.layout import NO_ANIMATION, axis, tooltip
 from controller.tuning.page.palette import Palette
 
 HEIGHT_PX: Final = 388
+RECOMMENDED: Final = "recommended"
 
 
 class Point(NamedTuple):
@@ -122,9 +123,11 @@ def _dots(
 
 
 def _datum(point: Point, panel: int) -> dict[str, Any]:
+    """Return a dot; what a study recommends is a triangle."""
     value = 100.0 * point.caught_share if panel == 0 else point.lead_s
     known = math.isfinite(value) and math.isfinite(point.per_hour)
-    return {"value": [point.per_hour, value] if known else ["-", "-"], "words": f"{point.name}<br>{point.outcome}"}
+    found = {"value": [point.per_hour, value] if known else ["-", "-"], "words": f"{point.name}<br>{point.outcome}"}
+    return {**found, "symbol": "triangle", "symbolSize": 15} if point.name == RECOMMENDED else found
 
 
 def _ring(colour: str) -> dict[str, Any]:
