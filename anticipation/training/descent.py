@@ -139,12 +139,12 @@ class _Descent:
                 self._restore(saved)
         for loss in self._losses:
             progress(loss)
-        model = self._run.team.parallel(self._fit.network)
-        for epoch in range(len(self._losses), self._recipe.epochs):
+        begin = len(self._losses)
+        for epoch in range(begin, self._recipe.epochs):
             if self._fit.thaw is not None and epoch >= GRAPH_FROZEN:
                 self._fit.thaw(True)
-                if epoch == GRAPH_FROZEN:
-                    model = self._run.team.parallel(self._fit.network)
+            if epoch in (begin, GRAPH_FROZEN):  # what is thawed before this has its gradients shared
+                model = self._run.team.parallel(self._fit.network)
             rate = float(self._schedule.get_last_lr()[0])
             self._losses.append(self._epoch(model))
             self._schedule.step()
@@ -227,9 +227,11 @@ class _Descent:
         self._schedule.load_state_dict(saved.facts["schedule"])
         for index, generator in enumerate(self._generators()):
             generator.set_state(saved.tensors[f"generator/{index}"])
-        torch.set_rng_state(saved.tensors["dropout/cpu"][self._run.team.rank])
+        rank = self._run.team.rank
+        # a clone, because torch reads a state from the start of its storage, and the second row's is the first's
+        torch.set_rng_state(saved.tensors["dropout/cpu"][rank].clone())
         if self._run.device.type == "cuda":
-            torch.cuda.set_rng_state(saved.tensors["dropout/cuda"][self._run.team.rank], self._run.device)
+            torch.cuda.set_rng_state(saved.tensors["dropout/cuda"][rank].clone(), self._run.device)
         self._losses = [float(loss) for loss in saved.facts["losses"]]
 
 

@@ -2,6 +2,7 @@
 
     python anticipation_fit_worker.py kill FOLDER       one run left alone, one killed until it is through
     python anticipation_fit_worker.py team FOLDER       one run alone, one by two processes
+    python anticipation_fit_worker.py pause FOLDER      one run by two processes, one that they stop and go on with
     python anticipation_fit_worker.py train FOLDER DATA `surefoot train`, left alone and killed
 
 The program itself runs no network, so that a fork of it is as good as a new process and costs no import.
@@ -50,8 +51,18 @@ def samples():
 SAMPLES = samples()
 
 
-def fit(folder, dropout):
+class PausedError(Exception):
+    """As many epochs as were wanted are done, and kept."""
+
+
+def fit(folder, dropout, pause_after=None):
     """Fit a forecaster and, on its forecasts, a classifier; write both to `result`."""
+
+    def progress(loss):
+        losses.append(loss)
+        if len(losses) == pause_after:
+            raise PausedError
+
     with joined(torch.device("cpu")) as (team, device):
         book = Journal(folder / "run", {"seed": 0}, team)
         run = Run(device, team, book)
@@ -60,8 +71,8 @@ def fit(folder, dropout):
         classifier = DirectedGraphNetwork(widths=(4, 4, 4), dropout=dropout)
         losses = []
         shares = [(SAMPLES, 1.0)]
-        fitting.fit_forecaster(forecaster, shares, RECIPE, losses.append, run.named("forecaster"))
-        fitting.fit_classifier(classifier, shares, RECIPE, forecaster, losses.append, run.named("classifier"))
+        fitting.fit_forecaster(forecaster, shares, RECIPE, progress, run.named("forecaster"))
+        fitting.fit_classifier(classifier, shares, RECIPE, forecaster, progress, run.named("classifier"))
         weights = {f"f/{k}": v for k, v in forecaster.state_dict().items()}
         weights |= {f"c/{k}": v for k, v in classifier.state_dict().items()}
         save_file(weights, folder / f"result-{team.rank}")
@@ -128,6 +139,23 @@ def finished(process):
     assert os.waitpid(process, 0)[1] == 0, "a process failed"
 
 
+def as_a_team(folder, *options, paused=False):
+    """Fit in two processes; with `paused` they must stop on their way."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        os.environ.update(MASTER_ADDR="127.0.0.1", MASTER_PORT=str(probe.getsockname()[1]), WORLD_SIZE="2")
+
+    def member(rank):
+        os.environ["RANK"] = rank
+        try:
+            fit(folder, *options)
+        except PausedError:
+            os._exit(7)
+
+    for process in [forked(lambda rank=rank: member(rank)) for rank in "01"]:
+        assert os.waitpid(process, 0)[1] == ((7 << 8) if paused else 0), "a process failed"
+
+
 def main(mode, folder, *rest):
     torch.set_num_threads(1)
     alone, other = folder / "alone", folder / "other"
@@ -139,16 +167,11 @@ def main(mode, folder, *rest):
     elif mode == "team":
         torch.set_default_dtype(torch.float64)  # so that only a mistake makes a difference
         finished(forked(lambda: fit(alone, 0.0)))
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            os.environ.update(MASTER_ADDR="127.0.0.1", MASTER_PORT=str(probe.getsockname()[1]), WORLD_SIZE="2")
-
-        def member(rank):
-            os.environ["RANK"] = rank
-            fit(other, 0.0)
-
-        for process in [forked(lambda rank=rank: member(rank)) for rank in "01"]:
-            finished(process)
+        as_a_team(other, 0.0)
+    elif mode == "pause":
+        as_a_team(alone, 0.5)
+        as_a_team(other, 0.5, RECIPE.epochs + descent.GRAPH_FROZEN + 1, paused=True)  # in the classifier's fit
+        as_a_team(other, 0.5)
     elif mode == "train":
         options = {"data": Path(rest[0]), "quick": True, "folds": 2, "epochs": 2, "logged": False}
         finished(forked(lambda: train(**options, out=alone / "weights")))

@@ -79,6 +79,17 @@ def test_two_processes_find_what_one_finds(tmp_path):
         assert torch.allclose(first[name], value, rtol=0, atol=1e-6), name
 
 
+@pytest.mark.processes
+@pytest.mark.timeout(300)
+def test_two_processes_that_were_stopped_go_on_as_if_they_had_not_been(tmp_path):
+    """Stopped after the graph has begun to learn: its gradients are shared, and each draws its own dropout on."""
+    work("pause", tmp_path)
+    for rank in (0, 1):
+        whole, paused = (load_file(tmp_path / name / f"result-{rank}") for name in ("alone", "other"))
+        for name, value in whole.items():
+            assert torch.equal(value, paused[name]), f"{name} of process {rank}"
+
+
 def test_torchrun_takes_no_option_of_ours_for_its_own():
     """It reads abbreviations of its own options even behind the command: `--run` could be its `--run-path`."""
     from torch.distributed.run import get_args_parser
