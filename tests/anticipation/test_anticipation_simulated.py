@@ -6,9 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from anticipation_people import falling
 
 from anticipation.training import simulated
 from anticipation.training.clips import FALL, STABLE, TRANSIENT, UNLABELLED, Arrays
+from anticipation.training.corpus import SIMULATED_CALM, SIMULATED_EVENT, SIMULATED_MOTION, Corpus, shares
+from anticipation.training.samples import clean
+from bridge.config.perception import CleaningConfig
 from bridge.errors import SourceError
 
 FPS = 30.0
@@ -93,3 +97,27 @@ def test_a_folder_of_clips_is_read_and_a_missing_one_named(tmp_path: Path) -> No
     assert (clip.width, clip.height, clip.fps) == (320, 320, FPS)
     assert clip.labels is not None
     assert set(clip.labels) == {STABLE, TRANSIENT, FALL}
+
+
+def test_falls_to_come_and_quiet_moments_are_learnt_each_with_its_share(tmp_path: Path) -> None:
+    keypoints, states = falling(1)
+    down = np.clip(np.arange(len(states)) - int(np.argmax(states == 0)), 0, 30) / 60
+    shows_s = float(np.argmax(states == 0) / FPS)
+    zeros = np.zeros(len(states))
+    np.savez(tmp_path / "fall-0000.npz", allow_pickle=False, **facts(
+        keypoints=keypoints, drop_m=down, load_weights=zeros, disturbed_s=shows_s - 0.1, visible_s=shows_s,
+    ))  # fmt: skip
+    calm = np.concatenate([keypoints[:20]] * 4)
+    np.savez(tmp_path / "non_fall-0000.npz", allow_pickle=False, **facts(
+        keypoints=calm, drop_m=zeros[:80], load_weights=zeros[:80], fall=0.0,
+    ))  # fmt: skip
+    tracks = tuple(clean(clip, CleaningConfig()) for clip in simulated.read(tmp_path))
+    learnt = shares(Corpus((), (), (), (), (), simulated=tracks), ())
+    ((_, motion),) = learnt.motion
+    (eventful, event), (quiet, rest) = learnt.gait
+    assert (motion, event, rest) == (SIMULATED_MOTION, SIMULATED_EVENT, SIMULATED_CALM)
+    assert len(eventful) > 10
+    assert len(quiet) > 10
+    assert np.isin(eventful.labels, [TRANSIENT, FALL]).any(axis=1).all()
+    assert np.isin(quiet.labels, [STABLE, UNLABELLED]).all()
+    assert set(eventful.track) == {0}

@@ -62,6 +62,7 @@ WAYS: dict[str, Way] = {
     r"surefoot evaluate.*": Way("learns", f"{QUICK} --no-live", long=True, data=True),
     r"surefoot data.*": Way("counts the research data", long=True, data=True),
     # what performs
+    r"surefoot clips.*": Way("performs in simulated time", "--falls 1 --non-falls 1 --jobs 1", long=True),
     r"surefoot campaign.*": Way("performs in simulated time", "--scenarios 1 --non-falls 1 --jobs 1", long=True),
     r"surefoot codegen .*": Way("CasADi writes C for some seconds", long=True),
     r"surefoot export .*": Way("traces and compares for some seconds", long=True),
