@@ -13,8 +13,8 @@ from simulation.campaign.clips.record import Help, record
 from simulation.scenarios.drawing import draw_checked
 from simulation.scenarios.scenario import Kind
 
-HELP_OF_FALLS: Final = (("none", 0.3), ("reactive", 0.3), ("early", 0.4))
-HELP_OF_OTHERS: Final = (("none", 0.4), ("reactive", 0.3), ("needless", 0.3))
+HELP_OF_FALLS: Final = {"none": 0.3, "reactive": 0.3, "early": 0.4}
+HELP_OF_OTHERS: Final = {"none": 0.4, "reactive": 0.3, "needless": 0.3}
 EARLY_S: Final = (0.0, 0.6)  # after the disturbance: from at once to when the harness' load speaks
 NEEDLESS_S: Final = (2.0, 5.5)  # after the beginning
 NEEDLESS_FOR_S: Final = 0.5
@@ -38,8 +38,8 @@ class ClipJob(NamedTuple):
 def drawn_help(kind: Kind, number: int, seed: int) -> Help:
     """Return what the walker does: nothing, wait for the load, or stiffen early, in a non-fall for nothing."""
     rng = np.random.default_rng([seed, number, kind == "fall", 1])
-    names, shares = zip(*(HELP_OF_FALLS if kind == "fall" else HELP_OF_OTHERS), strict=True)
-    name = str(rng.choice(names, p=shares))
+    shares = HELP_OF_FALLS if kind == "fall" else HELP_OF_OTHERS
+    name = str(rng.choice(list(shares), p=list(shares.values())))
     if name == "early":
         return Help(name, STEPS, float(rng.uniform(*EARLY_S)))
     if name == "needless":
