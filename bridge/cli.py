@@ -35,10 +35,14 @@ class Command(NamedTuple):
 COMMANDS: Final = {
     "up": Command("bridge.launch.command:up", "Run the processes and watch over them."),
     "codegen": Command("controller.mpc.export.command:codegen", "Write the MPC as C for a real-time target."),
+    "personalise": Command(
+        "controller.personal.command:personalise", "Find the mass and damping that one person likes, by comparisons."
+    ),
     "config": Command("bridge.config.command:config", "Print a configuration file with every key and its meaning."),
     "demo": Command("simulation.trial.command:demo", "A simulated person is pushed, with help and without."),
     "rehearse": Command("bridge.launch.rehearse:rehearse", "Run it all on a recorded stumble, without physics."),
     "assess": Command("bridge.assess.command:assess", "Assess keypoint clips offline with the code that runs live."),
+    "tune": Command("controller.tuning.command:tune", "Find thresholds by replaying recordings; see the trade-off."),
     "latency": Command("bridge.latency.command:latency", "Measure newest frame to command on the wire, hop by hop."),
     "record": Command("bridge.record.record_command:record", "Record what is on the wire into an MCAP file."),
     "info": Command("bridge.record.info_command:info", "Say what is in a recording, also one that was cut off."),

@@ -1,0 +1,1 @@
+"""Virtual mass and damping to one person's liking, learnt from comparisons."""
