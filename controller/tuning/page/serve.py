@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import secrets
 import socket
+import warnings
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
@@ -86,4 +87,6 @@ def _run(bench: Bench, listening: socket.socket, key: str, address: str) -> None
     )
     logging.getLogger("uvicorn.error").setLevel(logging.ERROR)
     note(f"open {address}   (Ctrl-C ends it)")
-    uvicorn.Server(config).run(sockets=[listening])
+    with warnings.catch_warnings():  # at its start the library looks at every object there is, torch's old ones too
+        warnings.simplefilter("ignore", FutureWarning)
+        uvicorn.Server(config).run(sockets=[listening])
