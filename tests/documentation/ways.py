@@ -20,9 +20,10 @@ class Way(NamedTuple):
     data: bool = False  # needs the research data
     never: bool = False  # executed nowhere
     code: int = 0  # its exit code
+    says: str = ""  # what its output has to hold, where the exit code alone does not tell
 
 
-PROCESSES = "--no-screen --duration 4 {wire}"
+AT_WORK = "DISARMED|FOLLOW|GUARD|ARREST|SAFE_STOP"  # commands came
 QUICK = "--quick --folds 2"
 
 WAYS: dict[str, Way] = {
@@ -35,12 +36,12 @@ WAYS: dict[str, Way] = {
         "two machines; tests/bridge/test_bridge_several_machines.py runs both files", never=True
     ),
     r"surefoot up --config keys/bridge\.toml": Way(
-        "real processes over TLS", "--no-screen --duration 4 --source clip.npz:walk {tls}", long=True
+        "real processes over TLS", "--no-screen --duration 15 --source clip.npz:walk {tls}", long=True, says=AT_WORK
     ),
     r"surefoot router .*": Way(
         "runs until it is stopped; tests/bridge/test_bridge_processes_nodes.py runs it", never=True
     ),
-    r"surefoot up .*": Way("real processes", PROCESSES, long=True),
+    r"surefoot up .*": Way("real processes", "--no-screen --duration 15 {wire}", long=True, says=AT_WORK),
     r"surefoot (demo|rehearse).*": Way("real processes in real time", long=True),
     r"surefoot latency.*": Way("real processes, for some seconds", "--duration 3", long=True),
     r"surefoot \S+ .*--json FILE": Way("FILE stands for any file", "--json said.json"),
@@ -53,6 +54,9 @@ WAYS: dict[str, Way] = {
     r"surefoot view \S+\.mcap( --video .*)?": Way("a file instead of a window", "--out shown.rrd --force"),
     r"surefoot replay \S+": Way("in real time, on ports of its own", "--delay 0 {wire}"),
     r"python examples/.*": Way("runs until it is stopped; tests/examples runs it", never=True),
+    r"surefoot personalise( --.*)?": Way(
+        "asks at the terminal; tests/controller/test_controller_personal_command.py answers", never=True
+    ),
     # what learns
     r"surefoot train.*cuda.*": Way("needs a GPU", never=True),
     r"torchrun .*--nnodes.*": Way("needs two machines", never=True),
