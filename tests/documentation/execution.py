@@ -62,6 +62,8 @@ def execute(command: Documented, folder: Path, places: dict[str, str], *, apart:
         raise NotAsDocumentedError(
             f"{command.page}: `{shlex.join(words)}` ended with exit code {code}:\n{out[-2000:]}{err[-2000:]}"
         )
+    if not re.search(known.says, out + err):
+        raise NotAsDocumentedError(f"{command.page}: `{shlex.join(words)}` did not say {known.says}:\n{out[-2000:]}")
     if command.output:
         (folder / command.output).parent.mkdir(parents=True, exist_ok=True)
         (folder / command.output).write_text(out, encoding="utf-8")
