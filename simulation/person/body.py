@@ -26,6 +26,7 @@ TORQUE_NM: Final = {
 
 PERSON: Final = 2  # collision class of the body: it meets the floor and furniture, not itself, not the walker
 SURROUNDINGS: Final = 1
+HIPS: Final = 8  # of the hips alone: a chair carries them
 
 
 def add_person(spec: Any, size: BodySize, friction: float = 0.8, forward_m: float = 0.0) -> None:
@@ -43,6 +44,7 @@ def add_person(spec: Any, size: BodySize, friction: float = 0.8, forward_m: floa
     _inertia(pelvis, tables.PELVIS, mass, size.lumbar_height_m, up=True)
     _capsule(pelvis, "pelvis", (0, -0.05 * h, 0.02 * h), (0, 0.05 * h, 0.02 * h), 0.065 * h, friction)
 
+    spec.geom("pelvis").contype = PERSON | HIPS
     torso = pelvis.add_body(name="torso", pos=[0, 0, size.lumbar_height_m])
     _hinge(spec, torso, "lumbar_pitch", (0, 1, 0), (-0.6, 1.6), size, armature=0.05, damping=3.0)
     _hinge(spec, torso, "lumbar_roll", (1, 0, 0), (-0.5, 0.5), size, armature=0.05, damping=3.0)
@@ -102,7 +104,7 @@ def _add_leg(spec: Any, pelvis: Any, side: str, sign: float, size: BodySize, fri
         name=f"{side}_sole", type=mujoco.mjtGeom.mjGEOM_BOX,
         size=[size.foot_m / 2, size.sole_half_width_m, half_height],
         pos=[size.sole_forward_m, 0.0, half_height - size.ankle_height_m],
-        priority=1, **_touching(friction, torsion=0.03),
+        priority=1, solref=[0.04, 1.0], **_touching(friction, torsion=0.03),
     )  # fmt: skip
 
 

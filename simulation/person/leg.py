@@ -15,7 +15,9 @@ from bridge.messages import Floats
 REACH = 0.998  # of the stretched leg: beyond it the knee would lock
 
 
-def leg_angles(ankle: Floats, rotation: Floats, hip: Floats, thigh_m: float, shank_m: float) -> Floats:
+def leg_angles(
+    ankle: Floats, rotation: Floats, hip: Floats, thigh_m: float, shank_m: float, reach: float = REACH
+) -> Floats:
     """Return the six joint angles [rad] that put the foot there; a target out of reach is drawn in towards the hip.
 
     Args:
@@ -24,10 +26,11 @@ def leg_angles(ankle: Floats, rotation: Floats, hip: Floats, thigh_m: float, sha
         hip: position of the hip joint in the pelvis frame, (3,) [m].
         thigh_m: hip to knee [m].
         shank_m: knee to ankle [m].
+        reach: longest leg, of the stretched one.
     """
     x, y, z = (rotation.T @ (hip - ankle)).tolist()
     length = sqrt(x * x + y * y + z * z)
-    longest = REACH * (thigh_m + shank_m)
+    longest = reach * (thigh_m + shank_m)
     if length > longest:
         x, y, z, length = x * longest / length, y * longest / length, z * longest / length, longest
     bend = (thigh_m**2 + shank_m**2 - length**2) / (2.0 * thigh_m * shank_m)

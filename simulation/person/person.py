@@ -9,7 +9,7 @@ exert.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, cos, exp, hypot, pi, sin, sqrt
+from math import atan2, cos, exp, hypot, sin, sqrt
 from typing import Any, Final
 
 import mujoco
@@ -18,19 +18,25 @@ import numpy as np
 from bridge.messages import Floats
 from simulation.person.ability import FRAIL, Ability
 from simulation.person.anthropometry import BodySize
-from simulation.person.body import LEG_JOINTS, SIDES, UPPER_JOINTS
+from simulation.person.body import SIDES
 from simulation.person.leg import leg_angles
 from simulation.person.reflexes import Reflexes
-from simulation.person.stepping import DOUBLE_SUPPORT_S, foothold, plan_step
+from simulation.person.stepping import DOUBLE_SUPPORT_S, Bob, bob, dip, foothold, plan_step
 from simulation.person.support import Sole, Stance, double_support, ground_force, single_support, wanted_pressure
+from simulation.person.swing import Leg
+from simulation.person.upper_body import UpperBody
 
 CONTROL_S: Final = 0.004
 GRAVITY: Final = 9.81
-UPPER_REST: Final = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.1, -0.1, -0.3, -0.3])
 LIMP_KD: Final = 1.0
 URGE_GAIN: Final = 0.08  # per step
 URGE_MOST_M_S: Final = 0.12
-FASTEST_M_S: Final = 1.15  # planned: beyond it these reflexes lose their balance by themselves
+RAISE_GAIN: Final = 0.3  # per step
+RAISE_MOST_M: Final = 0.06
+DEEPENS_M_S: Final = 0.1  # how fast the dip of the body follows the length of the steps
+LANDED: Final = 0.95  # share of a step after which a foot that touches the floor stands
+FELT_TO_SWING_S: Final = 0.06  # a hurried foot still needs this
+FASTEST_M_S: Final = 1.1  # planned: beyond it these reflexes lose their balance by themselves
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +48,7 @@ class Intent:
     crouch_m: float = 0.0  # centre of mass below its height in standing
     trunk_pitch_rad: float = 0.0  # forward bend in the hips and the back
     reach_rad: float = 0.0  # arms lifted forward
+    back_m: float = 0.0  # centre of mass behind the middle of the feet: who sits down trusts the chair
     effort: float = 1.0  # share of the strength used; 0 in a faint
 
 
@@ -59,29 +66,18 @@ class Person:
         """Stand the person of `simulation.person.body.add_person` up where it is in `model`."""
         self._model, self._data, self.size, self.ability = model, data, size, ability
         self._reflexes = g = Reflexes() if reflexes is None else reflexes
-        self._swing_kp = np.array([g.swing_yaw_nm_rad, *[g.swing_hip_nm_rad] * 2, g.swing_knee_nm_rad, 80.0, 60.0])
-        self._swing_kd = np.array([g.swing_yaw_nms_rad, *[g.swing_hip_nms_rad] * 2, g.swing_knee_nms_rad, 3.0, 2.0])
-        self._upper_kp = np.array([600.0, 600.0, g.back_yaw_nm_rad, *[g.arm_nm_rad] * 2, 20.0, 20.0, 10.0, 10.0])
-        self._upper_kd = np.array([40.0, 40.0, 15.0, *[g.arm_nms_rad] * 2, 2.0, 2.0, 1.0, 1.0])
         self._reaction = np.array([g.reaction_roll, g.reaction_pitch, g.reaction_yaw])
         self._trunk_kp = np.array([g.trunk_nm_rad, g.trunk_nm_rad, g.turn_nm_rad])
         self._trunk_kd = np.array([g.trunk_nms_rad, g.trunk_nms_rad, g.turn_nms_rad])
         self._turn_limit = g.turn_moment_nm * size.mass_kg / 70.0
-        joints = {side: [f"{side}_{name}" for name in LEG_JOINTS] for side, _ in SIDES}
-        self._leg_dof = {s: np.array([model.joint(n).dofadr[0] for n in joints[s]]) for s in joints}
-        self._leg_q = {s: np.array([model.joint(n).qposadr[0] for n in joints[s]]) for s in joints}
-        self._leg_motor = {s: np.array([model.actuator(n).id for n in joints[s]]) for s in joints}
-        self._hip_joint = {s: np.array([model.joint(n).id for n in joints[s][:3]]) for s in joints}
-        self._upper_dof = np.array([model.joint(n).dofadr[0] for n in UPPER_JOINTS])
-        self._upper_q = np.array([model.joint(n).qposadr[0] for n in UPPER_JOINTS])
-        self._upper_motor = np.array([model.actuator(n).id for n in UPPER_JOINTS])
-        self._motors = np.concatenate((*self._leg_motor.values(), self._upper_motor))
-        self._dofs = np.concatenate((*self._leg_dof.values(), self._upper_dof))
-        self._torque = np.abs(model.actuator_ctrlrange[:, 1])
         self.pelvis, self.torso = model.body("pelvis").id, model.body("torso").id
-        self.foot = {s: model.body(f"{s}_foot").id for s, _ in SIDES}
+        self._leg = {side: Leg(model, data, side, sign, size, g, CONTROL_S) for side, sign in SIDES}
+        self._upper = UpperBody(model, data, size, g)
+        self._motors = np.concatenate((*(leg.motor for leg in self._leg.values()), self._upper.motor))
+        self._dofs = np.concatenate((*(leg.dof for leg in self._leg.values()), self._upper.dof))
+        self._torque = np.abs(model.actuator_ctrlrange[:, 1])
+        self.foot = {side: leg.foot for side, leg in self._leg.items()}
         self.sole = {s: model.geom(f"{s}_sole").id for s, _ in SIDES}
-        self._hip = {s: np.array([0.0, sign * size.hip_half_width_m, 0.0]) for s, sign in SIDES}
         self._jacobian, self._spin = np.zeros((3, model.nv)), np.zeros((3, model.nv))
         self._velocity = np.zeros(6)
         self._moment_limit = ability.trunk_moment_nm * size.mass_kg / 70.0
@@ -98,14 +94,17 @@ class Person:
         self._speed = 0.0
         self._time_in_step = 0.0
         self._step = plan_step(0.0, size.height_m, self.width_m, ability)
+        self._lifts_s, self._lands_s = self._step.double_support_s, self._step.duration_s  # of this step, if hurried
+        self._alarmed_s = 0.0  # for how long the DCM has been far from where it should be
+        self._raised = 0.0  # what a person adds to the wanted height when they sagged in the last steps [m]
+        self._sagged = 0.0  # sum over the turns of this step [m]
         self._urge = 0.0  # what a person adds to the wanted speed when the last steps fell short of it [m/s]
         self._began_at = (0.0, 0.0)  # where the centre of mass was at the last touchdown
-        self._swing_from: Floats | None = None
-        self._swing_began_s = 0.0
+        self._lifted = False  # whether the swing of this step has begun
         self._foothold = (0.0, 0.0)
-        self._swing_angles: Floats | None = None
         self._pitch = 0.0
-        self._crouch = 0.0
+        self._crouch = self._back = 0.0
+        self._deep = 0.0  # by which the body is lowered in double support [m]
 
     @property
     def swing(self) -> str:
@@ -115,12 +114,12 @@ class Person:
     @property
     def swinging(self) -> bool:
         """Whether the swing leg is in the air by intention."""
-        return not self._standing and self._time_in_step >= self._step.double_support_s
+        return not self._standing and self._time_in_step >= self._lifts_s
 
     @property
     def phase(self) -> float:
         """Share of the present step that is over, 0..1."""
-        return min(self._time_in_step / self._step.duration_s, 1.0)
+        return min(self._time_in_step / self._lands_s, 1.0)
 
     def act(self, intent: Intent) -> None:
         """Set the torques for the next CONTROL_S seconds."""
@@ -147,14 +146,20 @@ class Person:
             reaction = self._swing_leg(torque, dcm, stance.centre, lead, heading)
             moment += self._reaction * reaction
             moment[2] = min(max(moment[2], -self._turn_limit), self._turn_limit)
-        height = self.standing_height_m - self._crouch
-        lift = min(max(g.lift_1_s2 * (height - float(com[2])) - g.lift_1_s * float(com_velocity[2]), -6.0), 6.0)
+        wave = self._bob()
+        height = self.standing_height_m - self._crouch - wave.low_m
+        self._sagged += height - float(com[2])
+        height += self._raised
+        lift = g.lift_1_s2 * (height - float(com[2])) - g.lift_1_s * (float(com_velocity[2]) + wave.sinking_m_s)
+        lift = wave.upward_m_s2 + min(max(lift, -6.0), 6.0)
         vertical = self.size.mass_kg * max(GRAVITY + lift, 2.0)
         force = ground_force(com, max(float(com[2]), 0.3), stance.centre, vertical, (moment[0], moment[1]))
         sides = (self.stance,) if in_air else (self.stance, self.swing)
         for side, share, point in zip(sides, stance.share, stance.pressure, strict=True):
             self._push(torque, side, share * force, point, share * moment[2])
-        self._posture(torque, intent)
+        feet = data.xpos[self.foot["l"]] - data.xpos[self.foot["r"]]
+        apart = heading[0] * float(feet[0]) + heading[1] * float(feet[1])
+        torque[self._upper.motor] = self._upper.torque(self._pitch, intent.reach_rad, apart, self._speed)
         limit = self._torque * (self.ability.strength * effort)
         np.clip(torque, -limit, limit, out=torque)
         data.ctrl[self._motors] = torque[self._motors]
@@ -169,6 +174,7 @@ class Person:
         if not self._standing:
             self.heading_rad += intent.yaw_rate_rad_s * CONTROL_S
         self._pitch += min(max(intent.trunk_pitch_rad - self._pitch, -1.5 * CONTROL_S), 1.5 * CONTROL_S)
+        self._back += min(max(intent.back_m - self._back, -1.0 * CONTROL_S), 1.0 * CONTROL_S)
         self._crouch += min(max(intent.crouch_m - self._crouch, -0.8 * CONTROL_S), 0.8 * CONTROL_S)
 
     def _decide(
@@ -177,39 +183,67 @@ class Person:
         """Start, end and repeat steps."""
         if self._standing:
             astray = self._astray(dcm, lead, trail, heading)
-            if intent.speed_m_s > 0.02 or astray:
+            if intent.speed_m_s > 0.02 or (astray and self._back == 0.0):
                 self._begin(self._first_stance(dcm, lead, trail, heading))
             return
-        planned = self._step.duration_s
-        if self._time_in_step < self._step.double_support_s + 0.5 * (planned - self._step.double_support_s):
+        self._hurry(dcm, lead, heading)
+        planned = self._lands_s
+        if self._time_in_step < self._lifts_s + 0.5 * (planned - self._lifts_s):
             return
         landed = self._on_floor(self.swing)
-        if not ((landed and self._time_in_step > 0.9 * planned) or self._time_in_step > planned + 0.15):
+        if not ((landed and self._time_in_step > LANDED * planned) or self._time_in_step > planned + 0.15):
             return
         self.steps += 1
         self._learn()
         wants_rest = intent.speed_m_s < 0.02 and self._speed < 0.05
         if wants_rest and not self._astray(dcm, lead, trail, heading):
-            self._standing, self._swing_from = True, None
+            self._standing, self._lifted = True, False
         else:
             self._begin(self.swing)
+
+    def _hurry(self, dcm: tuple[float, float], lead: Sole, heading: tuple[float, float]) -> None:
+        """Step at once, and sooner, when what was felt exceeds what standing feet can mend."""
+        g = self._reflexes
+        reference = self._reference(lead, heading)
+        beside = heading[0] * (dcm[1] - reference[1]) - heading[1] * (dcm[0] - reference[0])
+        if abs(beside) < g.alarm * self.size.height_m:
+            self._alarmed_s = 0.0
+            return
+        self._alarmed_s += CONTROL_S
+        if self._alarmed_s < self.ability.reaction_s:
+            return
+        if self._time_in_step < self._lifts_s:
+            c, s = heading
+            sign = 1.0 if self.stance == "l" else -1.0
+            outside = sign * (c * (dcm[1] - lead.y) - s * (dcm[0] - lead.x))
+            if outside > g.alarm_swap * self.size.height_m:
+                self.stance = self.swing
+            self._lifts_s = self._time_in_step
+            self._lands_s = min(self._step.duration_s, self._lifts_s + self.ability.shortest_step_s)
+        else:
+            least = (1.0 - self._leg[self.swing].swung) * g.hurry * self.ability.shortest_step_s
+            soonest = self._time_in_step + max(least, FELT_TO_SWING_S)
+            self._lands_s = min(self._lands_s, soonest)
 
     def _learn(self) -> None:
         """Walk a little harder after a step that was slower than wanted, and the other way round."""
         com = self._data.subtree_com[self.pelvis]
         way = (float(com[0]) - self._began_at[0]) * cos(self.heading_rad)
         way += (float(com[1]) - self._began_at[1]) * sin(self.heading_rad)
+        turns = self._time_in_step / CONTROL_S
+        self._raised = min(max(self._raised + RAISE_GAIN * self._sagged / turns, 0.0), RAISE_MOST_M)
         short = self._speed - way / self._time_in_step
         self._urge = min(max(self._urge + URGE_GAIN * short, -URGE_MOST_M_S), URGE_MOST_M_S) if self._speed > 0 else 0.0
 
     def _begin(self, stance: str) -> None:
         self._standing = False
-        self.stance, self._time_in_step, self._swing_from = stance, 0.0, None
+        self.stance, self._time_in_step, self._lifted = stance, 0.0, False
         com = self._data.subtree_com[self.pelvis]
-        self._began_at = (float(com[0]), float(com[1]))
+        self._began_at, self._sagged = (float(com[0]), float(com[1])), 0.0
         self._step = plan_step(
             min(self._speed + self._urge, FASTEST_M_S), self.size.height_m, self.width_m, self.ability
         )
+        self._lifts_s, self._lands_s = self._step.double_support_s, self._step.duration_s
 
     def _astray(self, dcm: tuple[float, float], lead: Sole, trail: Sole, heading: tuple[float, float]) -> bool:
         """Whether standing still can no longer keep the DCM over the feet."""
@@ -231,19 +265,33 @@ class Person:
     ) -> tuple[Stance, bool]:
         """Return the stance and whether the other leg is in the air."""
         if self._standing:
-            middle = ((lead.x + trail.x) / 2, (lead.y + trail.y) / 2)
+            c, s = heading
+            middle = ((lead.x + trail.x) / 2 - c * self._back, (lead.y + trail.y) / 2 - s * self._back)
             return double_support(lead, trail, self._pressure(dcm, middle, middle), heading, 0.0), False
-        step, remaining = self._step, self._until_transfer()
+        wanted = self._pressure(dcm, self._reference(lead, heading), (lead.x, lead.y))
+        if self._time_in_step >= self._lifts_s:
+            return single_support(lead, wanted, heading), True
+        return double_support(lead, trail, wanted, heading, self._time_in_step / self._lifts_s), False
+
+    def _reference(self, lead: Sole, heading: tuple[float, float]) -> tuple[float, float]:
+        """Return where the DCM should be at this moment of the step [m]."""
+        step = self._step
         side = 1.0 if self.stance == "l" else -1.0
         bx, by = step.offset(self._omega, side)
-        shrink = exp(-self._omega * remaining)
+        shrink = exp(-self._omega * self._until_transfer())
         ahead, beside = (step.length_m + bx) * shrink, (-side * step.width_m + by) * shrink
         c, s = heading
-        reference = (lead.x + c * ahead - s * beside, lead.y + s * ahead + c * beside)
-        wanted = self._pressure(dcm, reference, (lead.x, lead.y))
-        if self._time_in_step >= step.double_support_s:
-            return single_support(lead, wanted, heading), True
-        return double_support(lead, trail, wanted, heading, self._time_in_step / step.double_support_s), False
+        return lead.x + c * ahead - s * beside, lead.y + s * ahead + c * beside
+
+    def _bob(self) -> Bob:
+        """Return how the body is to rise and sink now."""
+        g, deep = self._reflexes, 0.0
+        if not self._standing:
+            ahead = 0.5 * abs(self._step.length_m) - self.size.sole_forward_m
+            deep = dip(ahead, self.size.leg_m, g.knees_bent, g.landing_leg)
+        change = DEEPENS_M_S * CONTROL_S
+        self._deep += min(max(deep - self._deep, -change), change)
+        return bob(self._deep, self._time_in_step - 0.5 * self._step.double_support_s, self._lands_s)
 
     def _pressure(
         self, dcm: tuple[float, float], reference: tuple[float, float], nominal: tuple[float, float]
@@ -252,61 +300,36 @@ class Person:
 
     def _until_transfer(self) -> float:
         """Return the time until the load is taken to change feet, a little after touchdown [s]."""
-        return max(self._step.duration_s - self._time_in_step, 0.0) + self._reflexes.transfer * DOUBLE_SUPPORT_S
+        return max(self._lands_s - self._time_in_step, 0.0) + self._reflexes.transfer * DOUBLE_SUPPORT_S
 
     def _swing_leg(
         self, torque: Floats, dcm: tuple[float, float], centre: tuple[float, float], lead: Sole,
         heading: tuple[float, float],
     ) -> Floats:  # fmt: skip
         """Move the swing leg towards the foothold; return the moment (3,) with which the leg turns the pelvis [N m]."""
-        data, step, side, g = self._data, self._step, self.swing, self._reflexes
-        ankle = data.xpos[self.foot[side]]
+        step, side, g = self._step, self.swing, self._reflexes
         c, s = heading
-        remaining = self._until_transfer()
         sign = 1.0 if self.stance == "l" else -1.0
-        growth = exp(self._omega * remaining)
+        growth = exp(self._omega * self._until_transfer())
         px, py = lead.x + g.pressure_carried * (centre[0] - lead.x), lead.y + g.pressure_carried * (centre[1] - lead.y)
         bx, by = step.offset(self._omega, sign)
         dx = px + (dcm[0] - px) * growth - lead.x
         dy = py + (dcm[1] - py) * growth - lead.y
         target = foothold((c * dx + s * dy - bx, c * dy - s * dx - by), sign, self.size.height_m, self.ability)
-        if self._swing_from is None:
-            self._swing_from, self._swing_began_s, self._swing_angles = ankle.copy(), self._time_in_step, None
-            self._foothold = target
+        leg = self._leg[side]
+        if not self._lifted:
+            self._lifted, self._foothold = True, target
+            leg.lift()
         blend = min(CONTROL_S / max(self.ability.reaction_s / 3.0, CONTROL_S), 1.0)
         self._foothold = (
             self._foothold[0] + blend * (target[0] - self._foothold[0]),
             self._foothold[1] + blend * (target[1] - self._foothold[1]),
         )
         forward, left = self._foothold[0] - self.size.sole_forward_m, self._foothold[1]
-        u = min(
-            max((self._time_in_step - self._swing_began_s) / max(step.duration_s - self._swing_began_s, 0.05), 0), 1
-        )
-        early = min(g.swing_early * u, 1.0)
-        way = early**3 * (10.0 - 15.0 * early + 6.0 * early**2)
-        start = self._swing_from
-        wanted = np.array([
-            (1 - way) * start[0] + way * (lead.x + c * forward - s * left),
-            (1 - way) * start[1] + way * (lead.y + s * forward + c * left),
-            self.size.ankle_height_m + g.swing_lift_m * sin(pi * u) - max(u - 0.9, 0.0) * g.swing_down,
-        ])  # fmt: skip
-        rotation = data.xmat[self.pelvis].reshape(3, 3)
-        upright = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-        angles = leg_angles(
-            rotation.T @ (wanted - data.xpos[self.pelvis]), rotation.T @ upright, self._hip[side],
-            self.size.thigh_m, self.size.shank_m,
-        )  # fmt: skip
-        rate = np.zeros(6) if self._swing_angles is None else (angles - self._swing_angles) / CONTROL_S
-        self._swing_angles = angles
-        np.clip(rate, -15.0, 15.0, out=rate)
-        dof, motor = self._leg_dof[side], self._leg_motor[side]
-        move = self._swing_kp * (angles - data.qpos[self._leg_q[side]]) + self._swing_kd * (rate - data.qvel[dof])
-        move *= self.size.strength
-        limit = self._torque[motor] * self.ability.strength
-        np.clip(move, -limit, limit, out=move)
-        torque[motor] = move + data.qfrc_bias[dof]
-        reaction: Floats = data.xaxis[self._hip_joint[side]].T @ move[:3]
-        return reaction
+        aim = (lead.x + c * forward - s * left, lead.y + s * forward + c * left)
+        move = leg.move(aim, heading, self._lands_s - self._time_in_step, self.ability.strength)
+        torque[leg.motor] = move + self._data.qfrc_bias[leg.dof]
+        return leg.turns_pelvis(move)
 
     def _trunk_moment(self, heading: tuple[float, float]) -> Floats:
         """Return the moment (3,) that turns the pelvis to its wanted posture [N m]."""
@@ -332,26 +355,12 @@ class Person:
     def _push(self, torque: Floats, side: str, force: Floats, point: tuple[float, float], turn: float) -> None:
         """Add the torques with which the leg of `side` pushes `force` through `point` of the floor."""
         ankle = self._data.xpos[self.foot[side]]
-        dof = self._leg_dof[side]
+        dof = self._leg[side].dof
         mujoco.mj_jac(self._model, self._data, self._jacobian, self._spin, ankle, self.foot[side])
         rx, ry, rz = point[0] - ankle[0], point[1] - ankle[1], -self.size.ankle_height_m
         fx, fy, fz = force
         moment = np.array([ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx + turn])
-        torque[self._leg_motor[side]] = -(self._jacobian[:, dof].T @ force + self._spin[:, dof].T @ moment)
-
-    def _posture(self, torque: Floats, intent: Intent) -> None:
-        """Hold the back, swing the arms against the legs, reach."""
-        data = self._data
-        feet = data.xpos[self.foot["l"]] - data.xpos[self.foot["r"]]
-        apart = cos(self.heading_rad) * feet[0] + sin(self.heading_rad) * feet[1]
-        swing = self._reflexes.arm_swing_rad * min(abs(self._speed), 1.0) * min(max(apart / 0.5, -1.0), 1.0)
-        wanted = UPPER_REST.copy()
-        wanted[0] = 0.4 * self._pitch
-        wanted[3] += swing - intent.reach_rad
-        wanted[4] -= swing + intent.reach_rad
-        dof = self._upper_dof
-        gain = self._upper_kp * (wanted - data.qpos[self._upper_q]) - self._upper_kd * data.qvel[dof]
-        torque[self._upper_motor] = self.size.strength * gain + data.qfrc_bias[dof]
+        torque[self._leg[side].motor] = -(self._jacobian[:, dof].T @ force + self._spin[:, dof].T @ moment)
 
     def _limp(self) -> None:
         """Leave the joints to gravity, with a little tone."""
@@ -378,9 +387,9 @@ class Person:
         data, size = self._data, self.size
         root = self._model.joint("root").qposadr[0]
         down = self._reflexes.knees_bent * size.leg_m
-        for side, sign in SIDES:
-            ankle = np.array([-0.3 * size.sole_forward_m, sign * size.hip_half_width_m, -down])
-            data.qpos[self._leg_q[side]] = leg_angles(ankle, np.eye(3), self._hip[side], size.thigh_m, size.shank_m)
+        for leg in self._leg.values():
+            ankle = leg.hip + np.array([-0.3 * size.sole_forward_m, 0.0, -down])
+            data.qpos[leg.q] = leg_angles(ankle, np.eye(3), leg.hip, size.thigh_m, size.shank_m)
         data.qpos[root + 2] = down + size.ankle_height_m + 0.001
-        data.qpos[self._upper_q] = UPPER_REST
+        data.qpos[self._upper.q] = UpperBody.REST
         mujoco.mj_forward(self._model, data)

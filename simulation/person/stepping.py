@@ -9,13 +9,14 @@ IEEE T-RO 36(3), 2020.
 
 from __future__ import annotations
 
-from math import exp
+from math import cos, exp, pi, sin, sqrt
 from typing import NamedTuple
 
 from simulation.person.ability import Ability
 
 SWING_S = 0.50  # a leg swings this long; slower walking stands longer on both legs
 DOUBLE_SUPPORT_S = 0.12  # at least
+DEEPEST_M = 0.025  # dip of the body
 
 
 class Step(NamedTuple):
@@ -55,3 +56,29 @@ def foothold(wanted: tuple[float, float], side: float, height_m: float, ability:
     forward = min(max(wanted[0], -ability.step_back * height_m), ability.step_forward * height_m)
     apart = min(max(-side * wanted[1], ability.step_narrow * height_m), ability.step_wide * height_m)
     return forward, -side * apart
+
+
+class Bob(NamedTuple):
+    """The body's rise and fall in walking."""
+
+    low_m: float  # below its height over the standing foot
+    sinking_m_s: float
+    upward_m_s2: float
+
+
+def dip(ahead_m: float, leg_m: float, standing: float, landing: float) -> float:
+    """Return how much lower the hips must be for the leg to reach `ahead_m` in front of them [m].
+
+    `standing` and `landing` are lengths of the bent leg in shares of the stretched one, `leg_m`, below the hips and at
+    touchdown: an inverted pendulum's arc, flattened by the knees.
+    """
+    reach = landing * leg_m
+    low = standing * leg_m - sqrt(max(reach * reach - max(ahead_m, 0.0) ** 2, 0.0))
+    return min(max(low, 0.0), DEEPEST_M)
+
+
+def bob(deep_m: float, since_lowest_s: float, step_s: float) -> Bob:
+    """Return the wave of one step, lowest in double support and highest over the standing foot."""
+    rate = 2.0 * pi / step_s
+    half, turn = 0.5 * deep_m, rate * since_lowest_s
+    return Bob(half * (1.0 + cos(turn)), -half * rate * sin(turn), half * rate * rate * cos(turn))

@@ -27,12 +27,21 @@ class SitDown:
     down_m: float
     lasts_s: float = 1.2
     bend_rad: float = 0.6
+    back_m: float = 0.12  # by which the weight goes behind the feet, in trust of the chair
 
     def act(self, world: World, intent: Intent, since_s: float) -> Intent:
-        """Go down and stay down."""
+        """Bend forward, go down and back, straighten up again on the seat."""
         del world
         down = gradual(since_s, self.lasts_s)
-        return replace(intent, crouch_m=self.down_m * down, trunk_pitch_rad=self.bend_rad * gradual(since_s, 0.8))
+        bend = gradual(since_s, 0.9 * self.lasts_s) - 0.8 * gradual(since_s - self.lasts_s, 1.0)
+        back = gradual(since_s, self.lasts_s)
+        return replace(
+            intent,
+            crouch_m=self.down_m * down,
+            trunk_pitch_rad=self.bend_rad * bend,
+            back_m=self.back_m * back,
+            reach_rad=bend,
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,6 +33,8 @@ AFTER_FALL_S: Final = 3.5
 AFTER_DEED_S: Final = 4.5
 FAULTY: Final = 0.1  # share of scenarios in which a sensor errs more than usual
 SITTING_BODY: Final = 0.045  # from the seat's top to the hip joint, in body heights: the flesh under the hips
+SEAT_EDGE_M: Final = 0.02  # behind where the hips are in standing: the calves all but touch the chair
+SEAT_DEPTH_M: Final = 0.45
 
 FALL_CHECKS: Final = ("arrested", "upright walker")
 CALM_CHECKS: Final = ("no needless arrest", "upright walker", "on their feet")
@@ -171,11 +173,16 @@ def stopping(rng: np.random.Generator, size: BodySize, ability: Ability) -> Scen
     return _calm("stopping", "walks and stops", size, ability, wishes, rng)
 
 
+def chair(size: BodySize, down_m: float) -> Seat:
+    """Return the raised chair behind a standing person that they reach when their hips come down by `down_m`."""
+    hips = size.leg_m + size.ankle_height_m
+    return Seat(-SEAT_EDGE_M - 0.5 * SEAT_DEPTH_M, hips - down_m - SITTING_BODY * size.height_m, SEAT_DEPTH_M)
+
+
 def sitting(rng: np.random.Generator, size: BodySize, ability: Ability) -> Scenario:
     """Sits down into a raised chair, slowly or fast."""
     down, lasts = float(rng.uniform(0.14, 0.22)), float(rng.uniform(0.7, 1.8))
-    hips = size.leg_m + size.ankle_height_m
-    seat = Seat(-0.36, hips - down - SITTING_BODY * size.height_m)
+    seat = chair(size, down)
     deed = SitDown(float(rng.uniform(2.5, 3.5)), down + 0.05, lasts)
     title = f"sits down by {down * 100:.0f} cm in {lasts:.1f} s"
     return _calm("sitting", title, size, ability, (Wish(0.0, Intent()),), rng, (deed,), seat)

@@ -16,7 +16,7 @@ import numpy as np
 from bridge.messages import Floats
 from simulation.person.ability import FRAIL, Ability
 from simulation.person.anthropometry import BodySize
-from simulation.person.body import PERSON, SURROUNDINGS, add_person
+from simulation.person.body import HIPS, PERSON, SURROUNDINGS, add_person
 from simulation.person.person import CONTROL_S, Intent, Person
 from simulation.world.harness import HarnessWrench, harness_wrench
 from simulation.world.looks import dress
@@ -33,8 +33,11 @@ BODY_PARTS: Final = (
 IMPACTS: Final = ("pelvis", "torso", "head", "l_shank", "r_shank", "l_thigh", "r_thigh")
 
 
+SEAT_M: Final = 0.08  # thickness of a seat
+
+
 class Seat(NamedTuple):
-    """A chair: the top of a box that only the person touches."""
+    """A chair: a cushion that carries the hips and nothing else."""
 
     x_m: float  # of its middle
     height_m: float = 0.45
@@ -81,9 +84,15 @@ class World:
         )  # fmt: skip
         if seat is not None:
             spec.worldbody.add_geom(
-                name="seat", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[seat.x_m, 0, seat.height_m / 2],
-                size=[seat.depth_m / 2, 0.25, seat.height_m / 2], contype=SURROUNDINGS, conaffinity=PERSON,
-                rgba=[0.6, 0.45, 0.3, 1],
+                name="seat", type=mujoco.mjtGeom.mjGEOM_BOX, pos=[seat.x_m, 0, seat.height_m - SEAT_M / 2],
+                size=[seat.depth_m / 2, 0.25, SEAT_M / 2], contype=0, conaffinity=HIPS, solref=[0.05, 1.0],
+                friction=[1.0, 0.005, 0.0001], priority=1, rgba=[0.6, 0.45, 0.3, 1],
+            )  # fmt: skip
+            spec.worldbody.add_geom(
+                name="chair", type=mujoco.mjtGeom.mjGEOM_BOX,
+                pos=[seat.x_m - 0.3 * seat.depth_m, 0, (seat.height_m - SEAT_M) / 2],
+                size=[0.2 * seat.depth_m, 0.2, (seat.height_m - SEAT_M) / 2], contype=0, conaffinity=0,
+                rgba=[0.5, 0.37, 0.25, 1],
             )  # fmt: skip
         add_person(spec, size)
         add_walker(spec, parameters)

@@ -20,15 +20,14 @@ from simulation.campaign.clips.node import talking_camera
 from simulation.campaign.trial import START_NS, TURN_NS
 from simulation.node import SimulationNode, performing
 from simulation.scenarios.deed import SitDown
-from simulation.scenarios.library import SITTING_BODY
+from simulation.scenarios.library import chair
 from simulation.scenarios.scenario import Performance, Scenario
-from simulation.world.world import Seat, World
+from simulation.world.world import World
 
 AFTER_S: Final = 2.8  # of a fall that is held, nothing new is seen later
 AFTER_CONTACT_S: Final = 0.5
 APART_M: Final = 0.05  # as far as a keypoint must be from where it would have been to be seen there
 NEVER: Final = float("inf")
-CHAIR_M: Final = -0.36  # where the chair of a missed seat would have stood
 
 
 class Help(NamedTuple):
@@ -123,9 +122,7 @@ def undisturbed(scenario: Scenario) -> Scenario:
     """Return `scenario` without its mishap: whoever misses a seat finds a chair."""
     if not scenario.disturbances or not isinstance(scenario.disturbances[0], SitDown):
         return replace(scenario, disturbances=())
-    hips = scenario.size.leg_m + scenario.size.ankle_height_m
-    seat = Seat(CHAIR_M, hips - scenario.lowered_m - SITTING_BODY * scenario.size.height_m)
-    return replace(scenario, seat=seat)
+    return replace(scenario, seat=chair(scenario.size, scenario.lowered_m))
 
 
 def visible_s(history: History, scenario: Scenario) -> float:
