@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from io import BytesIO
 from math import isfinite
 from typing import Any, Final
@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from bridge.colours import FAINT, FALL, INK, STABLE, TRANSIENT
+from controller.tuning.confidence import wilson
 from controller.tuning.recommend import Answer
 from controller.tuning.score import Outcome
 
@@ -28,8 +29,9 @@ def draw(answer: Answer) -> Figure:
         axes.grid(color="#eeeeee", linewidth=0.8, zorder=0)
         axes.tick_params(labelsize=9, colors=INK)
         axes.set_xlabel("needless interventions per hour", fontsize=10)
-    _panel(caught, answer, lambda one: 100.0 * one.caught_share)
-    _panel(lead, answer, lambda one: one.lead_median_s)
+    share, spread = wilson(answer.judged.caught, answer.judged.falls), answer.resampled.lead_median_s
+    _panel(caught, answer, lambda one: 100.0 * one.caught_share, (100.0 * share.low, 100.0 * share.high))
+    _panel(lead, answer, lambda one: one.lead_median_s, (spread.low, spread.high))
     caught.set_ylabel("falls caught [%]", fontsize=10)
     caught.set_ylim(-4.0, 104.0)
     lead.set_ylabel("median lead before the impact [s]", fontsize=10)
@@ -62,22 +64,27 @@ def png(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def _panel(axes: Any, answer: Answer, value: Any) -> None:
+def _panel(axes: Any, answer: Answer, value: Callable[[Outcome], float], spread: tuple[float, float]) -> None:
     def points(outcomes: Sequence[Outcome]) -> tuple[list[float], list[float]]:
-        known = [(one.per_hour, float(value(one))) for one in outcomes if isfinite(one.per_hour)]
-        known = [point for point in known if isfinite(point[1])]
+        known = [(one.per_hour, value(one)) for one in outcomes]
+        known = [point for point in known if isfinite(point[0]) and isfinite(point[1])]
         return [point[0] for point in known], [point[1] for point in known]
 
     axes.plot(
         *points(answer.every), "o", color=FAINT, alpha=0.35, markersize=4, markeredgewidth=0, label="tried", zorder=2
-    )
-    x, y = points([judged.outcome for judged in answer.front])
-    axes.plot(x, y, "o", color=TRANSIENT, markersize=6.5, label="none better", zorder=3)
+    )  # fmt: skip
+    front = [judged.outcome for judged in answer.front]
+    axes.plot(*points(front), "o", color=TRANSIENT, markersize=6.5, label="none better", zorder=3)
     axes.plot(*points([answer.present.outcome]), "D", color=INK, markersize=9, label="present values", zorder=4)
     best = answer.recommended.outcome
     axes.plot(*points([best]), "*", color=FALL, markersize=17, markeredgecolor="white", label="recommended", zorder=5)
-    if answer.held_out is not None:
-        axes.plot(
-            *points([answer.held_out]), "*", markerfacecolor="white", markeredgecolor=FALL, markersize=15,
-            markeredgewidth=1.4, label="chosen without, judged on", zorder=5,
-        )  # fmt: skip
+    if answer.held_out is None:
+        return
+    x, y = points([answer.held_out])
+    if x and isfinite(spread[0]):  # 95 % intervals
+        axes.plot(x * 2, spread, color=FALL, linewidth=1.0, alpha=0.6, zorder=1.5)
+        axes.plot((answer.needless.low, answer.needless.high), y * 2, color=FALL, linewidth=1.0, alpha=0.6, zorder=1.5)
+    axes.plot(
+        x, y, "*", markerfacecolor="white", markeredgecolor=FALL, markersize=15, markeredgewidth=1.4,
+        label="chosen without, judged on (95 %)", zorder=5,
+    )  # fmt: skip

@@ -17,7 +17,7 @@ from bridge.record.layout import SUFFIX
 from bridge.record.offline import replay_offline
 from bridge.record.reader import Recording
 from bridge.topics import FALL_HORIZON, KEYPOINTS, ODOMETRY, WRENCH, Topic
-from controller.tuning.cases import Case, Fall, Felt, horizons, stream
+from controller.tuning.cases import Case, Felt, horizons, stream
 from controller.tuning.falls import checked, read_falls
 from controller.tuning.judging import Judge, Judged
 
@@ -30,7 +30,6 @@ class RecordingJob(NamedTuple):
 
     path: Path
     name: str
-    falls: tuple[Fall, ...] | None = None  # None: see whether a list lies beside it
     recompute: bool = False  # horizons from the keypoints, also where the recording has some
 
 
@@ -72,7 +71,7 @@ def recording_case(job: RecordingJob, config: SurefootConfig) -> Case:
         _felt(WRENCH, wrench, [-float(cast(Wrench, one.message).force[2]) for one in wrench]),
         _felt(ODOMETRY, odometry, [-float(cast(Odometry, one.message).velocity[2]) for one in odometry]),
     )  # fmt: skip
-    return _with_falls(case, job)
+    return _with_falls(case, job.path)
 
 
 def _foreseen(recording: Recording, samples: dict[str, list[Any]], config: SurefootConfig) -> list[Any]:
@@ -103,14 +102,12 @@ def _felt(topic: Topic, judged: Sequence[Judged], value: Sequence[float]) -> Fel
     return Felt(of, np.array(value))
 
 
-def _with_falls(case: Case, job: RecordingJob) -> Case:
-    if job.falls is not None:
-        return replace(case, falls=checked(case, job.falls, job.path))
-    beside = job.path.with_name(job.path.name.removesuffix(SUFFIX) + SIDECAR)
+def _with_falls(case: Case, path: Path) -> Case:
+    beside = path.with_name(path.name.removesuffix(SUFFIX) + SIDECAR)
     if not beside.exists():
         return replace(case, labelled=False)
     listed = read_falls(beside)
-    names = {job.path.name, job.path.stem, job.name}
+    names = {path.name, path.stem}
     if strange := sorted(set(listed) - names):
-        raise SourceError(f"{beside}: names '{strange[0]}', expected '{job.path.name}'")
+        raise SourceError(f"{beside}: names '{strange[0]}', expected '{path.name}'")
     return replace(case, falls=checked(case, [fall for falls in listed.values() for fall in falls], beside))

@@ -11,6 +11,7 @@ from bridge.config.surefoot import SurefootConfig
 from bridge.errors import ConfigError
 from simulation.campaign.arms import ARMS
 from simulation.campaign.job import Job, perform
+from simulation.campaign.recordings import FOLDER
 from simulation.campaign.report import parquet, report
 from simulation.campaign.store import Store
 from simulation.campaign.workers import work
@@ -26,6 +27,7 @@ class Plan(NamedTuple):
     seed: int
     config: SurefootConfig
     arms: tuple[str, ...] = ARMS
+    recorded: str = ""  # arm whose trials are kept as recordings; '' for none
 
     def jobs(self) -> list[Job]:
         """Return the pieces of work, falls and non-falls in turn.
@@ -38,6 +40,8 @@ class Plan(NamedTuple):
                 raise ConfigError(f"arm {arm}: known: {', '.join(ARMS)}")
         if self.falls + self.non_falls < 1 or not self.arms:
             raise ConfigError("a campaign of no scenarios or no arms has no result")
+        if self.recorded and self.recorded not in self.arms:
+            raise ConfigError(f"--record {self.recorded}: no arm of this campaign ({', '.join(self.arms)})")
         jobs: list[Job] = []
         for number in range(max(self.falls, self.non_falls)):
             if number < self.falls:
@@ -52,6 +56,7 @@ class Plan(NamedTuple):
         return {
             "falls": self.falls, "non_falls": self.non_falls, "seed": self.seed, "arms": list(self.arms),
             "config_sha256": hashlib.sha256(text.encode()).hexdigest(),
+            **({"recorded": self.recorded} if self.recorded else {}),
         }  # fmt: skip
 
 
@@ -69,7 +74,7 @@ def run_campaign(
         SurefootError: the folder holds another campaign, a package is missing, or a job failed.
     """
     parquet()
-    jobs = plan.jobs()
+    jobs = [job._replace(recorded=plan.recorded, recordings=folder.resolve() / FOLDER) for job in plan.jobs()]
     store = Store(folder, plan.described())
     missing = [job for job in jobs if not store.done(job.name)]
     done = len(jobs) - len(missing)

@@ -26,6 +26,9 @@ def campaign(
     scenarios: Annotated[int, typer.Option(min=1, help="Falls, and as many non-falls.")] = 300,
     non_falls: Annotated[int | None, typer.Option(min=0, help="Non-falls, if not as many as falls.")] = None,
     arms: Annotated[str, typer.Option(metavar="ARM,...", help="Which arms.")] = ",".join(ARMS),
+    record: Annotated[
+        str, typer.Option(metavar="ARM", show_default=False, help="Keep the trials of this arm as recordings.")
+    ] = "",
     out: Annotated[
         Path, typer.Option("--out", metavar="FOLDER", help="Folder of the results; a stopped campaign goes on there.")
     ] = Path("runs/campaign"),
@@ -47,7 +50,7 @@ def campaign(
     """
     plan = Plan(
         scenarios, scenarios if non_falls is None else non_falls, seed, load_config(config, set_ or []),
-        tuple(arm.strip() for arm in arms.split(",")),
+        tuple(arm.strip() for arm in arms.split(",")), record,
     )  # fmt: skip
     if json is not None:
         require_writable(json)

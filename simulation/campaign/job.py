@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from bridge.config.surefoot import SurefootConfig
+from bridge.record.layout import SUFFIX
 from simulation.campaign.checks import failed
 from simulation.campaign.trace import Trace
 from simulation.campaign.trial import run_trial
@@ -22,6 +24,8 @@ class Job(NamedTuple):
     seed: int
     arms: tuple[str, ...]
     config: SurefootConfig
+    recorded: str = ""  # arm whose trials are kept as recordings
+    recordings: Path = Path()  # where
 
     @property
     def name(self) -> str:
@@ -35,7 +39,8 @@ def perform(job: Job) -> dict[str, Any]:
     scenario, course = drawn.scenario, drawn.course
     trials: dict[str, Any] = {}
     for arm in job.arms:
-        measures, trace = run_trial(scenario, arm, job.config)
+        keep = job.recordings / f"{job.name}.{arm}{SUFFIX}" if arm == job.recorded else None
+        measures, trace = run_trial(scenario, arm, job.config, keep)
         trials[arm] = {
             "measures": measures.row(), "failed_checks": failed(scenario, measures), "curves": _curves(trace),
         }  # fmt: skip
