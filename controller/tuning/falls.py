@@ -7,6 +7,7 @@ import difflib
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
@@ -104,12 +105,13 @@ def checked(case: Case, falls: Collection[Fall], where: Path) -> tuple[Fall, ...
         SourceError: one lies beyond the end of the case, or begins before the one before it is over.
     """
     ordered = sorted(falls)
-    for fall, following in zip(ordered, [*ordered[1:], None], strict=True):
+    for fall in ordered:
         if fall.impact_s > case.duration_s:
             raise SourceError(
                 f"{where}: {case.name}: impact at {fall.impact_s:g} s, the recording ends at {case.duration_s:.2f} s"
             )
-        if following is not None and following.onset_s < min(fall.over_s, OPEN):
+    for fall, following in pairwise(ordered):
+        if following.onset_s < fall.over_s:
             raise SourceError(
                 f"{where}: {case.name}: a fall begins at {following.onset_s:g} s, before the one at "
                 f"{fall.onset_s:g} s is over; give its over_s"
