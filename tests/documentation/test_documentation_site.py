@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +16,8 @@ from documented import REPO
 from bridge.cli import COMMANDS
 from bridge.config.surefoot import SurefootConfig
 from bridge.topics import TOPICS
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 pytestmark = pytest.mark.timeout(300)  # a loaded machine takes its time to build it
 
@@ -60,6 +64,20 @@ def test_what_would_be_fetched_is_noticed(tmp_path: Path) -> None:
 
 def test_the_search_index_lies_beside_the_pages(site: Path) -> None:
     assert "within-class standard deviation" in text(site / "search" / "search_index.js")
+
+
+@pytest.mark.processes
+@pytest.mark.parametrize("page", ["index.html", "reference/python/controller.html"])
+def test_the_search_finds_without_a_server(site: Path, tmp_path: Path, page: str) -> None:
+    browser = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    if browser is None:
+        pytest.skip(f"no browser here: {', '.join(BROWSERS)}")
+    words = [browser, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}"]
+    words += ["--virtual-time-budget=20000", "--dump-dom", f"file://{site / page}?q=stiffening+profile"]
+    shown = subprocess.run(words, capture_output=True, text=True, check=False, timeout=200).stdout
+    found = re.search(r"([1-9]\d*) matching documents", shown)
+    assert found, shown[-500:]
+    assert "concepts.html" in shown[found.end() :]
 
 
 def test_the_front_page_is_the_readme(site: Path) -> None:
