@@ -102,11 +102,11 @@ def train(
     for file in FILES:
         if file.needed:
             required(folder, file.path)
-    measured = None if evaluated is None else production.read_evaluation(evaluated)
+    plan = plan_for(recipe, seed, quick, epochs)
+    measured = None if evaluated is None else production.read_evaluation(evaluated, plan)
     require_writable(out, "--out")
     if out.exists() and not force:
         raise SurefootError(f"--out {out}: the name is taken; --force replaces it")
-    plan = plan_for(recipe, seed, quick, epochs)
     plan = plan if clips is None or quick else plan.larger(WITH_SIMULATED)
     _one_thread()
     with joined(_device(device)) as (team, place):
@@ -115,7 +115,7 @@ def train(
             if journal.begun:
                 note(f"going on with the run in {journal.folder}")
             acted = () if clips is None else simulated.read(clips)
-            corpus = read_corpus(folder, plan.mocap_clips, seed, CleaningConfig(), _own(own), acted)
+            corpus = read_corpus(folder, plan.mocap_clips, seed, _own(own), acted)
             with _log(logged, journal, team) as log, progress_bars(team.leads) as progress:
                 run = Run(place, team, journal, log)
                 made = production.make_checkpoint(corpus, plan, folds, seed, measured, progress, run)

@@ -56,17 +56,19 @@ class Shares:
 
 
 def read_corpus(
-    folder: Path, mocap_clips: int, seed: int, cleaning: CleaningConfig, own: tuple[Track, ...] = (),
-    simulated: Sequence[Clip] = (),
-) -> Corpus:  # fmt: skip
+    folder: Path, mocap_clips: int, seed: int, own: tuple[Track, ...] = (), simulated: Sequence[Clip] = ()
+) -> Corpus:
     """Read, clean and sort all recordings; walks of OUMVLP-Pose too, where they are there.
+
+    They are cleaned as the defaults say, whatever a configuration says of the system that runs: what is learnt from
+    and what is tested are the same for everybody.
 
     Raises:
         SourceError: a file is missing or damaged.
     """
 
     def cleaned(clips: Sequence[Clip]) -> tuple[Track, ...]:
-        return tuple(clean(clip, cleaning) for clip in clips)
+        return tuple(clean(clip, CleaningConfig()) for clip in clips)
 
     staged = upfall.read(folder)
     walks = cleaned(mocap.read(folder, mocap_clips, seed))

@@ -24,8 +24,6 @@ BEFORE: Final = 60  # frames shown before the onset
 AFTER: Final = 60  # and after the contact
 DOWN_M: Final = 0.45  # the trunk's middle is lower: on the ground. It is 1.1 m standing, 0.6 m squatting
 FALLING: Final = 30  # frames before lying that URFD calls falling
-LIVELY: Final = ("jumps", "sprint", "run", "walk", "dance", "fight")  # files with normal motion
-STRETCH: Final = 150  # frames of a clip of normal motion
 
 
 class Contact(NamedTuple):
@@ -92,26 +90,6 @@ def read_others(folder: Path, cameras: int, seed: int) -> list[Clip]:
         SourceError: a file is missing or damaged.
     """
     return _read_contacts(folder, Seen.NO_FALL, cameras, seed)
-
-
-def read_lively(folder: Path, clips: int, seed: int) -> list[Clip]:
-    """Draw stretches of walking, running, jumping, dancing and fighting in which nobody touches the ground.
-
-    Raises:
-        SourceError: the file is missing or damaged.
-    """
-    rng = np.random.default_rng(seed)
-    motions = load_arrays(required(folder, "mocap/lafan1.npz"))
-    names = [name for name in sorted(motions) if name.startswith(LIVELY)]
-    drawn: list[Clip] = []
-    for index in range(clips):
-        name = names[index % len(names)]
-        start = int(rng.integers(max(1, len(motions[name]) - STRETCH)))
-        points = motions[name][start : start + STRETCH]
-        if not on_ground(points).any():
-            labels = np.full(len(points), STABLE, dtype=np.int64)
-            drawn.append(_seen(f"{name}/{start}", f"lafan1/{name}", points, labels, rng))
-    return drawn
 
 
 def measure(points: Floats, contact: Contact) -> Descent:

@@ -26,6 +26,7 @@ from bridge.errors import SourceError
 from bridge.messages import Floats
 
 FOLDER: Final = "oumvlp"
+SOURCE: Final = "OUMVLP-Pose"
 LICENCE: Final = "research use, by agreement with Osaka University"
 FPS: Final = 25.0
 WIDTH: Final = 1280
@@ -90,7 +91,7 @@ def _clip(place: Path, person: str, angle: str, walk: str, estimator: Estimator)
     keypoints = read_sequence(place)
     labels = np.full(len(keypoints), STABLE, dtype=np.int64)
     name = f"oumvlp-{person}-{angle}-{walk}/{estimator}"
-    return Clip(name, f"oumvlp/{person}", keypoints, FPS, labels, WIDTH, HEIGHT, "OUMVLP-Pose", LICENCE)
+    return Clip(name, f"oumvlp/{person}", keypoints, FPS, labels, WIDTH, HEIGHT, SOURCE, LICENCE)
 
 
 def read_sequence(place: Path) -> Floats:

@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.progress import Progress
 from torch import nn
 
 from anticipation.checkpoint import Checkpoint, Provenance
 from anticipation.motion import COORDINATES, WINDOW
 from anticipation.quality import PoseStatistics
+from anticipation.training import oumvlp, own, simulated
 from anticipation.training.corpus import Corpus, Shares, people_folds, shares, tested
 from anticipation.training.fitting import apply
 from anticipation.training.measures import temperatures
 from anticipation.training.networks import fitted_classifier, fitted_outlook, pretrained_forecaster, tuned_forecaster
 from anticipation.training.plan import Plan
 from anticipation.training.run import ALONE, Run
-from anticipation.training.samples import Samples, Track, cut
+from anticipation.training.samples import Track, cut
 from anticipation.transient import TransientPlane, fold
 from bridge.errors import SourceError
 from bridge.messages import STEPS, Floats
@@ -32,6 +33,11 @@ LICENCE: Final = (
     "research, non-commercial: learnt from URFD (CC BY-NC-SA 4.0), UP-Fall (research use), "
     "Bandai Namco Research Motiondataset (CC BY-NC 4.0) and CMU mocap (free for all uses)"
 )
+FURTHER: Final = {  # where they were there, each with what its owner asks
+    oumvlp.SOURCE: f"OUMVLP-Pose ({oumvlp.LICENCE})",
+    own.SOURCE: "own recordings (as their owner allows)",
+    simulated.SOURCE: f"simulated people ({simulated.LICENCE})",
+}
 DATA: Final = ("URFD", "UP-Fall", "Bandai Namco Research Motiondataset", "CMU mocap")
 PLANE_DAILY: Final = 500  # windows of daily activities the plane is fitted to
 PLANE_WALKS: Final = 2000  # windows of mocap
@@ -60,16 +66,13 @@ def make_checkpoint(
         known = shares(corpus, chosen)
         first = fold_checkpoint(corpus, chosen, known, pretrained, plan, seed, "calibration", progress, run)
         held_out = cut(tested(corpus, test, "both"))
-        temperature = temperatures(_logits(first, held_out), held_out.labels)
+        temperature = temperatures(apply(first.logits, held_out.frames[:, :WINDOW]), held_out.labels)
     else:
         temperature = np.array(evaluation["temperature"], dtype=np.float64)
     made = fold_checkpoint(corpus, corpus.people, everything, pretrained, plan, seed, "all recordings", progress, run)
     protocol = "not evaluated" if evaluation is None else str(evaluation["protocol"])
-    learnt = (
-        *DATA,
-        *(name for name in ("OUMVLP-Pose", "own", "simulated") if any(track.source == name for track in _all(corpus))),
-    )
-    provenance = Provenance(learnt, LICENCE, protocol, {} if evaluation is None else _summary(evaluation))
+    metrics = {} if evaluation is None else _summary(evaluation)
+    provenance = replace(made.provenance, protocol=protocol, metrics=metrics)
     return replace(made, temperature=temperature, provenance=provenance)
 
 
@@ -106,23 +109,35 @@ def fold_checkpoint(
         temperature=np.ones(STEPS),
         mirrored=plan.mirrored,
         outlook=fitted_outlook(plan, known, name, progress, run),
-        provenance=Provenance(DATA, LICENCE, f"{name}: for evaluation only"),
+        provenance=_provenance((*chosen, *corpus.walks, *corpus.simulated), f"{name}: for evaluation only"),
     )
 
 
-def read_evaluation(path: Path) -> dict[str, Any]:
-    """Read what `surefoot evaluate --json` wrote.
+def read_evaluation(path: Path, plan: Plan) -> dict[str, Any]:
+    """Read what `surefoot evaluate --json` wrote of networks that learn by `plan`.
 
     Raises:
-        SourceError: missing, not JSON, or without temperatures.
+        SourceError: missing, not JSON, without usable temperatures, or of another forecaster.
     """
     try:
         report = json.loads(path.read_text())
     except (OSError, ValueError) as error:
         raise SourceError(f"evaluation '{path}' cannot be read: {error}") from error
-    if not isinstance(report, dict) or len(report.get("temperature", ())) != STEPS or "protocol" not in report:
-        raise SourceError(f"evaluation '{path}' has no protocol or not {STEPS} temperatures: write it with --json")
+    if not isinstance(report, dict) or not isinstance(report.get("protocol"), str):
+        raise SourceError(f"evaluation '{path}' names no protocol: write it with surefoot evaluate --json")
+    given = report.get("temperature")
+    if not isinstance(given, list) or len(given) != STEPS or not all(_is_temperature(each) for each in given):
+        raise SourceError(f"evaluation '{path}' has no {STEPS} positive temperatures: write it with --json")
+    if report.get("forecaster") != plan.forecaster:
+        raise SourceError(
+            f"evaluation '{path}' is of the forecaster {report.get('forecaster')}, and {plan.forecaster} is to be "
+            "trained: evaluate the same --recipe"
+        )
     return report
+
+
+def _is_temperature(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < math.inf
 
 
 def _summary(evaluation: Mapping[str, Any]) -> dict[str, Any]:
@@ -135,13 +150,12 @@ def _summary(evaluation: Mapping[str, Any]) -> dict[str, Any]:
     return kept
 
 
-def _all(corpus: Corpus) -> tuple[Track, ...]:
-    return corpus.people + corpus.walks + corpus.simulated
-
-
-def _logits(checkpoint: Checkpoint, samples: Samples) -> NDArray[np.float32]:
-    """Return logits (M, 16, 3) of the present and the 15 foreseen steps."""
-    return apply(checkpoint.logits, samples.frames[:, :WINDOW])
+def _provenance(learnt: Sequence[Track], protocol: str) -> Provenance:
+    """Name the data sets that were learnt from, with the licence of each."""
+    sources = {track.source for track in learnt}
+    further = [name for name in FURTHER if name in sources]
+    licence = LICENCE + "".join(f"; {FURTHER[name]}" for name in further)
+    return Provenance((*DATA, *further), licence, protocol)
 
 
 def _plane(corpus: Corpus, chosen: Sequence[Track], seed: int) -> TransientPlane:

@@ -16,6 +16,7 @@ LICENCE: Final = "CC BY-NC-SA 4.0"
 WIDTH: Final = 320
 HEIGHT: Final = 240
 FPS: Final = 30.0
+EXACT: Final = "adl-40"  # the daily activity that was tracked frame by frame
 
 Estimator = Literal["alphapose", "movenet"]
 
@@ -44,12 +45,12 @@ def read_daily(folder: Path) -> list[Clip]:
     The labels begin with frame 45, when the person enters, and end with the last frame.
     There 0 and 1 mean lying down on purpose. A window of someone lying is the same
     whichever way they came down, so frames from the descent on carry no label.
-    `adls.npz` also holds 38 sequences of 8 keypoints without elbows and wrists: these
-    are not read, because a network that always sees 12 would learn the gap, not the person.
+    `adls.npz` also holds 39 sequences of 8 keypoints without elbows and wrists, one of them of
+    this very activity: these are not read, because a network that always sees 12 would learn the gap, not the person.
     """
     arrays = load_arrays(required(folder, "urfd/adls.npz"))
-    track = arrays["adl-40/movenet"]
-    standing = arrays["adl-40/label"].astype(np.int64) < 0
+    track = arrays[f"{EXACT}/movenet"]
+    standing = arrays[f"{EXACT}/label"].astype(np.int64) < 0
     labels = np.full(len(track), UNLABELLED, dtype=np.int64)
     labels[len(track) - len(standing) :][standing] = STABLE
-    return [Clip("adl-40/movenet", "urfd/adl-40", track, FPS, labels, WIDTH, HEIGHT, "URFD", LICENCE)]
+    return [Clip(f"{EXACT}/movenet", f"urfd/{EXACT}", track, FPS, labels, WIDTH, HEIGHT, "URFD", LICENCE)]

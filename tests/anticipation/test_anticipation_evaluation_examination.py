@@ -86,8 +86,10 @@ def test_what_comes_later_changes_nothing_said_before(walker):
         assert np.array_equal(one[:40], other, equal_nan=True)
 
 
-def test_examination_notes_every_tick_and_every_simpler_way():
+@pytest.mark.parametrize(("outlook", "judges"), [(True, "DGNN + outlook"), (False, "DGNN")])
+def test_examination_notes_every_tick_and_every_simpler_way(outlook, judges):
     made = random_checkpoint()
+    made = made if outlook else replace(made, outlook=None)
     clips = [Recording(clip_of(number), "fall") for number in range(2)]
     records = examine(made, ShiftedNetwork().eval(), [], clips, 3)
     for record, (clip, kind) in zip(records, clips, strict=True):
@@ -98,11 +100,11 @@ def test_examination_notes_every_tick_and_every_simpler_way():
         assert (ticks.valid | ~ticks.tested).mean() > 0.9
         assert np.isfinite(ticks.probabilities[ticks.valid]).all()
         assert np.isnan(ticks.probabilities[~ticks.valid]).all()
-        assert set(ticks.rows) == {SHIFTED, "zero velocity + DGNN", "constant velocity + DGNN"}
+        assert set(ticks.rows) == {SHIFTED, f"zero velocity + {judges}", f"constant velocity + {judges}"}
         said = ticks.rows[SHIFTED][ticks.tested]
         assert (said[:, ::3] >= 0).all()
         assert (said[:, 1::3] == -1).all()
-        still = ticks.rows["zero velocity + DGNN"][ticks.valid]
+        still = ticks.rows[f"zero velocity + {judges}"][ticks.valid]
         assert (still[:, 0] == ticks.probabilities[ticks.valid][:, 0].argmax(axis=-1)).all()
 
 
@@ -124,8 +126,11 @@ def test_tracks_of_eight_keypoints_leave_elbows_and_wrists_open(tmp_path):
     (tmp_path / "urfd").mkdir()
     seen = np.random.default_rng(0).random((40, 8, 2))
     held = np.arange(40) >= 30
-    np.savez(tmp_path / "urfd" / "adls.npz", **{"seg00_adl-01/keypoints8": seen, "seg00_adl-01/held": held})
-    (clip,) = read_partial(tmp_path)
+    tracks = {f"{name}/keypoints8": seen for name in ("seg00_adl-01", "seg38_adl-40")}
+    tracks |= {f"{name}/held": held for name in ("seg00_adl-01", "seg38_adl-40")}
+    np.savez(tmp_path / "urfd" / "adls.npz", **tracks)
+    (clip,) = read_partial(tmp_path)  # adl-40 is learnt from by its exact track
+    assert clip.name == "seg00_adl-01/eight"
     assert clip.keypoints.shape == (40, 12, 3)
     assert np.isnan(clip.keypoints[:, 2:6]).all()
     assert np.isfinite(clip.keypoints[:30, [0, 1, 6, 7, 8, 9, 10, 11]]).all()

@@ -1,5 +1,6 @@
 """Who learns from what and is tested on what, with networks that are never trained."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from anticipation.training.plan import RecipeName, plan_for
 from anticipation.training.samples import clean, cut
 from bridge.config.perception import CleaningConfig
 from bridge.config.surefoot import SurefootConfig
+from bridge.errors import SourceError
 
 
 def mocap(number):
@@ -146,3 +148,28 @@ def test_the_live_pass_again_keeps_what_was_said_and_replaces_what_was_done(stud
         assert (record.frames.state != before[name].frames.state).any()
         if record.ticks is not None:
             assert record.ticks is before[name].ticks
+
+
+@pytest.mark.parametrize("protocol", [lambda made: grouped(made, 2), cross], ids=["grouped", "cross"])
+def test_a_live_pass_made_later_is_the_one_that_was_left_out(study, protocol):
+    """Clips without falls are in no record until the whole system was run over them."""
+    made, _ = study
+    at_once = protocol(made)
+    later = observed(protocol(replace(made, live=False)), made)
+    parts = {record.name: (record.part, record.kind) for record in at_once.records}
+    assert {record.name: (record.part, record.kind) for record in later.records} == parts
+    assert all(record.frames is not None for record in later.records)
+
+
+def test_a_live_pass_by_the_papers_protocol_is_refused(study):
+    made, _ = study
+    with pytest.raises(SourceError, match="every clip was learnt from in part"):
+        observed(paper(made), made)
+
+
+def test_a_live_pass_over_other_walks_than_the_networks_know_is_refused(study):
+    made, _ = study
+    found = grouped(made, 2)
+    larger = replace(made, plan=plan_for(RecipeName.SUREFOOT, 0, False))
+    with pytest.raises(SourceError, match="know 8 clips of motion capture, this command reads 600: .*--quick again"):
+        observed(found, larger)

@@ -78,7 +78,7 @@ def report(tmp_path_factory):
     (source / "curve.json").write_text(json.dumps(EXPERIMENT))
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("SUREFOOT_DATA", raising=False)
-        evaluate(stored=source, report=folder, json_file=folder / "n.json", experiments=[source / "curve.json"])
+        evaluate(stored=source, out=folder, json=folder / "n.json", experiments=[source / "curve.json"])
     return folder, Page((folder / "index.html").read_text()), made
 
 
@@ -153,7 +153,7 @@ def test_what_cannot_be_read_is_one_line(tmp_path, damage):
     if damage == "other format":
         np.savez(path, meta=np.frombuffer(b'{"format": 99}', dtype=np.uint8))
     with pytest.raises(SurefootError) as failure:
-        evaluate(stored=tmp_path, report=tmp_path)
+        evaluate(stored=tmp_path, out=tmp_path)
     assert "\n" not in str(failure.value)
     assert "grouped" in str(failure.value)
 

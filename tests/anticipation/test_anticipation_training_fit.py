@@ -1,6 +1,7 @@
 """Training and evaluation, on people made of twelve points that stand, fall over and lie."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,11 +13,11 @@ from typer.testing import CliRunner
 from anticipation import checkpoint
 from anticipation.gait_state import DirectedGraphNetwork
 from anticipation.motion import HORIZON, WINDOW, DctMlpForecaster, LstmForecaster, zero_velocity
-from anticipation.training import fitting
+from anticipation.training import fitting, production
 from anticipation.training.augmentation import augment
 from anticipation.training.clips import Clip
 from anticipation.training.commands import train
-from anticipation.training.evaluation.command import evaluate
+from anticipation.training.evaluation.command import Protocol, evaluate
 from anticipation.training.measures import calibration_error, temperatures
 from anticipation.training.plan import RecipeName, plan_for
 from anticipation.training.samples import clean, cut
@@ -119,10 +120,48 @@ def test_train_writes_a_checkpoint_that_loads(made_data, tmp_path):
     assert (loaded.temperature > 0).all()
 
 
+def test_the_licence_names_everything_that_was_learnt_from():
+    def of(*sources):
+        track = SimpleNamespace
+        return production._provenance([track(source=source) for source in sources], "none")
+
+    usual = of("URFD", "UP-Fall", "cmu", "bandai_namco")
+    assert usual.data == production.DATA
+    assert usual.licence == production.LICENCE
+    more = of("URFD", "own", "OUMVLP-Pose")
+    assert more.data == (*production.DATA, "OUMVLP-Pose", "own")
+    assert more.licence.startswith(production.LICENCE)
+    assert "OUMVLP-Pose (research use, by agreement with Osaka University)" in more.licence
+    assert "own recordings" in more.licence
+    assert "Apache-2.0" in of("simulated").licence
+
+
+def test_what_is_learnt_does_not_hang_on_the_configuration_of_who_evaluates(made_data, monkeypatch):
+    studies = []
+
+    def run(study, *rest):
+        studies.append(study)
+        raise SurefootError("enough")
+
+    monkeypatch.setattr("anticipation.training.evaluation.command._run", run)
+    for settings in (None, ["perception.cleaning.cutoff_hz=3"]):
+        with pytest.raises(SurefootError, match="enough"):
+            evaluate(data=made_data, quick=True, set_=settings)
+    usual, other = studies
+    assert other.config.perception.cleaning.cutoff_hz == 3, "the system that runs live is the user's"
+    for one, two in zip(usual.corpus.people, other.corpus.people, strict=True):
+        assert np.array_equal(one.frames, two.frames, equal_nan=True)
+
+
+def test_the_whole_system_is_not_run_over_what_was_learnt(made_data):
+    with pytest.raises(SurefootError, match="--live: by the paper's protocol every clip was learnt from in part"):
+        evaluate(data=made_data, quick=True, protocol=Protocol.PAPER, live=True)
+
+
 def test_the_paper_s_recipe_makes_the_paper_s_networks(made_data, tmp_path):
     """LSTM of Table 1 rolled forward, DGNN on coordinates alone, and nothing that the paper does not have."""
     measured = tmp_path / "measured.json"
-    measured.write_text(json.dumps({"protocol": "none", "temperature": [1.0] * (HORIZON + 1)}))
+    measured.write_text(json.dumps({"protocol": "none", "forecaster": "lstm", "temperature": [1.0] * (HORIZON + 1)}))
     out = tmp_path / "weights.safetensors"
     options = ["train", "--data", str(made_data), "--quick", "--recipe", "paper", "--evaluation", str(measured)]
     result = CliRunner().invoke(commands(), [*options, "--no-tensorboard", "--out", str(out)], catch_exceptions=False)
@@ -152,9 +191,27 @@ def test_incomplete_data_is_one_line(command, tmp_path):
     assert "SUREFOOT_DATA" in str(failure.value)
 
 
-def test_an_evaluation_that_is_none_is_refused_before_training(made_data, tmp_path):
+GOOD = {"protocol": "grouped", "forecaster": "mlp", "temperature": [1.0] * (HORIZON + 1)}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"protocol": None}, "names no protocol"),
+        ({"temperature": None}, "no 16 positive temperatures"),
+        ({"temperature": 1.0}, "no 16 positive temperatures"),
+        ({"temperature": [1.0] * HORIZON}, "no 16 positive temperatures"),
+        ({"temperature": [1.0] * HORIZON + [0.0]}, "no 16 positive temperatures"),
+        ({"temperature": [1.0] * HORIZON + [float("nan")]}, "no 16 positive temperatures"),
+        ({"temperature": [1.0] * HORIZON + [float("inf")]}, "no 16 positive temperatures"),
+        ({"temperature": [1.0] * HORIZON + ["1"]}, "no 16 positive temperatures"),
+        ({"forecaster": "lstm"}, "is of the forecaster lstm, and mlp is to be trained"),
+        ({"forecaster": None}, "is of the forecaster None"),
+    ],
+)
+def test_an_evaluation_that_is_none_is_refused_before_training(made_data, tmp_path, changes, words):
     wrong = tmp_path / "wrong.json"
-    wrong.write_text("{}")
-    with pytest.raises(SurefootError, match=r"wrong\.json"):
+    wrong.write_text(json.dumps(GOOD | changes))
+    with pytest.raises(SurefootError, match=rf"wrong\.json' .*{words}"):
         train(data=made_data, evaluated=wrong, quick=True, out=tmp_path / "x.safetensors")
     assert not (tmp_path / "x.safetensors").exists()

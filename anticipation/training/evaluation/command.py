@@ -14,7 +14,7 @@ from anticipation.training import simulated
 from anticipation.training.clips import data_folder
 from anticipation.training.corpus import read_corpus
 from anticipation.training.evaluation import records
-from anticipation.training.evaluation.protocols import Study, cross, grouped, observed, paper
+from anticipation.training.evaluation.protocols import NOT_LIVE, Study, cross, grouped, observed, paper
 from anticipation.training.evaluation.recordings import read_recordings
 from anticipation.training.evaluation.records import Predictions
 from anticipation.training.evaluation.results import results_of
@@ -31,6 +31,7 @@ from anticipation.training.report.page import PAGE
 from bridge.command_line.options import ConfigOption, DataOption, JsonOption, SeedOption, SetOption
 from bridge.command_line.output import STDOUT, note, require_writable, result_console, write_json
 from bridge.config.load import load_config
+from bridge.errors import SourceError
 
 
 class Protocol(StrEnum):
@@ -115,6 +116,8 @@ def evaluate(
     Draw again, without training: surefoot evaluate --from runs/report --out runs/report
     """
     parsed = load_config(config, set_ or [])
+    if live and protocol is Protocol.PAPER:
+        raise SourceError(NOT_LIVE)
     told = [read_experiment(path) for path in experiments or []]
     if json is not None:
         require_writable(json)
@@ -129,7 +132,7 @@ def evaluate(
             plan = plan if clips is None or quick else plan.larger(WITH_SIMULATED)
             folder = data_folder(data)
             acted = () if clips is None else simulated.read(clips)
-            corpus = read_corpus(folder, plan.mocap_clips, seed, parsed.perception.cleaning, simulated=acted)
+            corpus = read_corpus(folder, plan.mocap_clips, seed, simulated=acted)
             filmed = read_recordings(folder, corpus, plan.mocap_clips, seed)
             return Study(corpus, filmed, plan, seed, place, parsed, progress, keypoints, baselines, live is not False)
 

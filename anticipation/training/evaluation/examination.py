@@ -34,7 +34,7 @@ from bridge.messages import STEPS, Keypoints
 from perception.features import relative
 
 SHIFTED: Final = "DGNN only, shifted labels"
-NAIVE: Final = {"zero velocity + DGNN": "zero_velocity", "constant velocity + DGNN": "constant_velocity"}
+NAIVE: Final = {"zero velocity": "zero_velocity", "constant velocity": "constant_velocity"}
 
 
 def examine(
@@ -49,8 +49,9 @@ def examine(
     Without `shifted`, the paper's baseline, the naive forecasts are left out too.
     """
     predictor = Predictor(checkpoint, AnticipationConfig())
+    judges = "DGNN" if checkpoint.outlook is None else "DGNN + outlook"
     naive = {
-        name: Predictor(checkpoint, AnticipationConfig.model_validate({"forecaster": forecaster}))
+        f"{name} + {judges}": Predictor(checkpoint, AnticipationConfig.model_validate({"forecaster": forecaster}))
         for name, forecaster in (NAIVE.items() if shifted is not None else ())
     }
     return [

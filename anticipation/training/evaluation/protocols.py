@@ -25,10 +25,17 @@ from anticipation.training.production import fold_checkpoint
 from anticipation.training.samples import Track, cut
 from anticipation.training.splits import random_windows
 from bridge.config.surefoot import SurefootConfig
+from bridge.errors import SourceError
 from bridge.messages import Floats
 
 SHARE_OF_FALLS: Final = 0.6  # of a batch, in the paper's protocol
 PLANE: Final = ("centres", "weights", "biases")
+CROSSED: Final = (("URFD", "UP-Fall"), ("UP-Fall", "URFD"))  # learnt from, tested on
+PAPER: Final = "paper"
+NOT_LIVE: Final = (
+    "--live: by the paper's protocol every clip was learnt from in part, so the whole system is not run over them; "
+    "--protocol grouped or cross"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,18 +92,12 @@ def grouped(study: Study, folds: int) -> Predictions:
     """Test every recording by networks that have not seen its group."""
     parts = _Parts(study, shares(study.corpus, ()))
     people = study.corpus.people
-    part_of: dict[str, int] = {}
     for part, (training, test) in enumerate(people_folds(study.corpus, folds, study.seed)):
         chosen = [people[index] for index in training]
-        held_out = {people[index].name for index in test}
-        part_of |= dict.fromkeys(held_out, part)
         name = f"fold {part + 1}/{folds}"
-        parts.add(name, chosen, shares(study.corpus, chosen), held_out)
+        parts.add(name, chosen, shares(study.corpus, chosen), {people[index].name for index in test})
     parts.calibrated()
-    # What no network learns from at all is shared out among them.
-    others = [each.clip.name for each in study.recordings if each.clip.name not in part_of]
-    part_of |= {name: index % folds for index, name in enumerate(others)}
-    return _finished(study, parts, "grouped", [f"fold {part + 1}" for part in range(folds)], part_of)
+    return _finished(study, parts, "grouped", [f"fold {part + 1}" for part in range(folds)])
 
 
 def paper(study: Study) -> Predictions:
@@ -118,46 +119,71 @@ def paper(study: Study) -> Predictions:
     kept = np.zeros(len(windows), dtype=np.bool_)
     kept[test] = True
     parts.records = [_thinned(record, kept[windows.track == names.index(record.name)]) for record in parts.records]
-    return _finished(replace(study, live=False), parts, "paper", ["random windows"], {})
+    return _finished(replace(study, live=False), parts, "paper", ["random windows"])
 
 
 def cross(study: Study) -> Predictions:
     """Test each data set by networks that know only the other one and the mocap walks."""
     parts = _Parts(study, shares(study.corpus, ()))
-    part_of: dict[str, int] = {}
     titles = []
-    for part, (own, other) in enumerate((("URFD", "UP-Fall"), ("UP-Fall", "URFD"))):
+    for own, other in CROSSED:
         chosen = [track for track in study.corpus.people if track.source == own]
         held_out = {each.clip.name for each in study.recordings if each.clip.source == other}
         parts.add(own, chosen, shares(study.corpus, chosen), held_out)
-        part_of |= dict.fromkeys(held_out, part)
         titles.append(f"{own} and mocap, tested on {other}")
-    return _finished(study, parts, "cross", titles, part_of)
+    return _finished(study, parts, "cross", titles)
 
 
 def observed(predictions: Predictions, study: Study) -> Predictions:
-    """Run the whole system over every clip again, with the checkpoints in the study's folder."""
+    """Run the whole system over every clip, those without falls included, with the checkpoints in the study's folder.
+
+    Raises:
+        SourceError: by this protocol every clip was learnt from; or the study learns from other walks, so that it is
+            not known which clips the checkpoints have not seen.
+    """
     protocol = str(predictions.meta["protocol"])
+    if protocol == PAPER:
+        raise SourceError(NOT_LIVE)
+    clips = predictions.meta.get("mocap_clips", study.plan.mocap_clips)  # not told before it was stored
+    if clips != study.plan.mocap_clips:
+        raise SourceError(
+            f"the report's networks know {clips} clips of motion capture, this command reads {study.plan.mocap_clips}: "
+            "give the same --recipe and --quick again"
+        )
     paths = [_path(study.folder, protocol, part) for part in range(len(predictions.meta["parts"]))]
-    part_of = {record.name: record.part for record in predictions.records}
     bare = [replace(record, frames=None) for record in predictions.records if record.ticks is not None]
-    return replace(predictions, records=_watched(study, bare, paths, part_of))
+    return replace(predictions, records=_watched(study, bare, paths, unseen_by(study, protocol, len(paths))))
 
 
-def _finished(
-    study: Study, parts: _Parts, protocol: str, titles: Sequence[str], part_of: dict[str, int]
-) -> Predictions:
+def unseen_by(study: Study, protocol: str, parts: int) -> dict[str, int]:
+    """Return for each recording that is run through the whole system the part whose networks had not seen it."""
+    if protocol == "cross":
+        titles = {other: part for part, (_, other) in enumerate(CROSSED)}
+        return {each.clip.name: titles[each.clip.source] for each in study.recordings if each.clip.source in titles}
+    people = study.corpus.people
+    part_of: dict[str, int] = {}
+    for part, (_, test) in enumerate(people_folds(study.corpus, parts, study.seed)):
+        part_of |= {people[index].name: part for index in test}
+    # What no network learns from at all is shared out among them.
+    others = [each.clip.name for each in study.recordings if each.clip.name not in part_of]
+    return part_of | {name: index % parts for index, name in enumerate(others)}
+
+
+def _finished(study: Study, parts: _Parts, protocol: str, titles: Sequence[str]) -> Predictions:
     paths = []
     for part, fitted in enumerate(parts.checkpoints):
         paths.append(_path(study.folder, protocol, part))
         checkpoints.save(fitted, paths[-1])
-    records = _watched(study, parts.records, paths, part_of) if study.live else parts.records
+    records = parts.records
+    if study.live:
+        records = _watched(study, records, paths, unseen_by(study, protocol, len(paths)))
     meta: dict[str, Any] = {
         "protocol": protocol,
         "seed": study.seed,
         "parts": list(titles),
         "keypoints": study.keypoints,
         "forecaster": study.plan.forecaster,
+        "mocap_clips": study.plan.mocap_clips,
     }
     return Predictions(meta, records, parts.planes())
 

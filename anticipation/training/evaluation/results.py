@@ -109,9 +109,9 @@ def _whole_system(predictions: Predictions, falls: Sequence[Record]) -> dict[str
         "upfall": [fall for fall in map(fall_of, staged) if fall],
     }
     everything = [fall for each in found.values() for fall in each]
-    if not everything and not calm(predictions.records):
-        return {}
     activities = calm(predictions.records)
+    if not everything and not activities:
+        return {}
     return {
         "events": {
             **{name: together(each)._asdict() for name, each in found.items()},

@@ -7,7 +7,7 @@ and of the classifier's pooled features. The plane that is shipped is one of the
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Final, Literal, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import torch
@@ -22,7 +22,6 @@ from anticipation.training.samples import Track, cut
 from anticipation.transient import TransientPlane, fold
 from bridge.messages import KEYPOINTS, Floats
 
-Reduction = Literal["pca", "lda"]
 Windows = NDArray[np.float32]
 
 DAILY_WINDOWS: Final = 500  # of daily activities a plane is fitted to, as the shipped one
