@@ -19,6 +19,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from controller_tuning_page_cases import CONFIG
+
 REPO = Path(__file__).resolve().parents[2]
 SERVED = Path(__file__).with_name("controller_tuning_page_cases.py")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -27,7 +29,6 @@ FLAGS = (
     "--disable-background-networking", "--disable-component-update", "--disable-default-apps", "--lang=en",
 )  # fmt: skip
 WAIT_S = 30.0
-CONFIG = "# our walker\nversion = 1\n\n[intervention]\nprobability_onset = 0.4  # tried in March\n"
 
 
 def missing() -> str:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from bridge.config.load import load_config
+from bridge.config.load import load_config, parse_config
 from bridge.config.surefoot import SurefootConfig
 from bridge.exit_codes import ExitCode
 from controller.tuning.cases import Case, Fall, Horizons, stream
@@ -17,6 +18,32 @@ from controller.tuning.replay import replay
 from controller.tuning.score import Outcome, score
 
 FRAME_S = 1.0 / 30.0
+THRESHOLDS = {  # those that the recordings are made for, whatever the defaults are
+    "distance_onset_sd": 1.5,
+    "distance_full_sd": -0.5,
+    "approach_onset_s": 0.8,
+    "approach_full_s": 0.3,
+    "approach_far_sd": 3.5,
+    "approach_near_sd": 2.0,
+    "credible_onset": 0.3,
+    "credible_full": 0.7,
+    "unconfirmed_most": 0.7,
+    "probability_full": 0.8,
+    "rise_per_s": 8.0,
+    "release_per_s": 1.0,
+    "arrest_per_s": 20.0,
+    "probability_onset": 0.4,
+}
+CONFIG = "\n".join(
+    (
+        "# our walker",
+        "version = 1",
+        "",
+        "[intervention]",
+        *(f"{key} = {value}" for key, value in THRESHOLDS.items()),
+    )
+).replace("probability_onset = 0.4", "probability_onset = 0.4  # tried in March")
+CONFIG += "\n\n[supervisor]\nguard_on = 0.25\narrest_on = 0.8\n"
 BUDGET_PER_H = 30.0
 
 
@@ -52,6 +79,11 @@ def made_up(
     )
     known = tuple(Fall(when_s, when_s + 0.9) for when_s in falls_s)
     return Case(name, name, 0, 10_000_000, round(length_s * 100), horizons, falls=known)
+
+
+def walker() -> SurefootConfig:
+    """Return what CONFIG says."""
+    return parse_config(tomllib.loads(CONFIG), "walker.toml")
 
 
 def recordings() -> list[Case]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from controller_tuning_page_cases import candidates, made_up, recordings
+from controller_tuning_page_cases import CONFIG, THRESHOLDS, candidates, made_up, recordings, walker
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -34,7 +34,7 @@ from controller.tuning.score import score_one
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     path = tmp_path / "walker.toml"
-    path.write_text("version = 1\n\n[intervention]\nprobability_onset = 0.4 # tried in March\n")
+    path.write_text(CONFIG)
     return path
 
 
@@ -61,20 +61,20 @@ def test_a_cue_that_is_switched_off_far_outside_is_within_its_sliders_reach() ->
     ("values", "refusal"),
     [
         ({"probability_onset": 1.2}, "intervention.probability_onset = 1.2: input should be less than or equal to 1"),
-        ({"probability_onset": 0.9}, "intervention: probability_onset = 0.9 must be below probability_full = 0.8"),
+        ({"probability_onset": 0.95}, "intervention: probability_onset = 0.95 must be below probability_full = 0.8"),
         ({"rise_per_s": None}, "intervention.rise_per_s = None: input should be a valid number"),
         ({"steps_used": 2.5}, "intervention.steps_used = 2.5: input should be a valid integer"),
         ({"release_per_s": math.nan}, "intervention.release_per_s = nan: input should be a finite number"),
     ],
 )
 def test_a_bad_value_is_refused_in_the_words_of_the_config(values: dict[str, float | None], refusal: str) -> None:
-    accepted, said = Draft.of(SurefootConfig()).change(**values).check()
+    accepted, said = Draft.of(walker()).change(**values).check()
     assert accepted is None
     assert said.startswith(refusal)
 
 
 def test_a_draft_names_what_differs_from_the_file() -> None:
-    draft = Draft.of(SurefootConfig())
+    draft = Draft.of(walker())
     assert draft.changed == {}
     moved = draft.change(rise_per_s=9.0)
     assert moved.changed == {"rise_per_s": (8.0, 9.0)}
@@ -111,7 +111,7 @@ def test_bands_cover_the_recording_without_gap_or_overlap() -> None:
 
 
 def test_the_list_says_what_was_needless_what_caught_a_fall_and_what_was_missed() -> None:
-    config = SurefootConfig()
+    config = walker()
     stumble, _, sitting, walking = recordings()
 
     def verdicts(case, intervention):
@@ -125,7 +125,7 @@ def test_the_list_says_what_was_needless_what_caught_a_fall_and_what_was_missed(
 
 
 def test_the_timeline_draws_states_curves_thresholds_and_falls() -> None:
-    config = SurefootConfig()
+    config = walker()
     case = recordings()[0]
     run = replay(case, config.intervention, config.supervisor)
     options = timeline_options(run, config, DAY, Layout(wide=True), "distance_onset_sd")
@@ -153,7 +153,7 @@ def test_horizons_that_nobody_may_use_are_gaps_and_their_quality_is_zero() -> No
             *(getattr(horizons, name) for name in ("probabilities", "distance", "distance_rate", "quality", "step_s")),
         ),
     )  # fmt: skip
-    config = SurefootConfig()
+    config = walker()
     run = replay(broken, config.intervention, config.supervisor)
     options = timeline_options(run, config, DAY, Layout(wide=True), "")
     by_name = {series["name"]: series["data"] for series in options["series"]}
@@ -188,7 +188,7 @@ def test_saving_keeps_the_file_and_the_previous_value(bench: Bench, file: Path) 
     said = bench.save(Draft.of(bench.config).change(probability_onset=0.45, steps_used=8.0))
     assert str(file) in said
     text = file.read_text()
-    assert tomllib.loads(text)["intervention"] == {"probability_onset": 0.45, "steps_used": 8}
+    assert tomllib.loads(text)["intervention"] == {**THRESHOLDS, "probability_onset": 0.45, "steps_used": 8}
     assert "0.4" in text
     assert "tried in March" in text
     assert bench.config.intervention.probability_onset == 0.45
@@ -205,10 +205,10 @@ def test_a_bad_draft_writes_nothing(bench: Bench, file: Path) -> None:
 
 def test_a_file_that_somebody_changed_meanwhile_is_not_overwritten(bench: Bench, file: Path) -> None:
     draft = Draft.of(bench.config).change(rise_per_s=9.0)
-    file.write_text(file.read_text().replace("0.4", "0.5"))
+    file.write_text(CONFIG.replace("0.4 ", "0.5 "))
     with pytest.raises(SurefootError, match="was changed since this page read it: reload"):
         bench.save(draft)
-    assert "rise_per_s" not in file.read_text()
+    assert file.read_text() == CONFIG.replace("0.4 ", "0.5 ")
 
 
 def test_saving_elsewhere_leaves_the_file_alone_and_goes_on_there(file: Path, tmp_path: Path) -> None:
@@ -219,7 +219,7 @@ def test_saving_elsewhere_leaves_the_file_alone_and_goes_on_there(file: Path, tm
     bench.save(Draft.of(bench.config).change(release_per_s=2.0))
     assert file.read_bytes() == before
     assert tomllib.loads(out.read_text())["intervention"] == {
-        "probability_onset": 0.4, "rise_per_s": 9.0, "release_per_s": 2.0,
+        **THRESHOLDS, "rise_per_s": 9.0, "release_per_s": 2.0,
     }  # fmt: skip
 
 

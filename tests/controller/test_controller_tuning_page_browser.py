@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from controller_tuning_page_browser import CONFIG, Page, Served, browsing, missing
+from controller_tuning_page_browser import Page, Served, browsing, missing
+from controller_tuning_page_cases import CONFIG, THRESHOLDS
 
 pytestmark = pytest.mark.processes
 
@@ -50,7 +51,7 @@ def test_a_dragged_slider_changes_the_counts_and_what_is_saved_is_there_after_a_
 
     page.button("Save").click()
     page.until(lambda: "saved to" in page.text(".q-notification"))
-    assert page.served.values() == {"probability_onset": new}
+    assert page.served.values() == {**THRESHOLDS, "probability_onset": new}
     written = page.served.config.read_text()
     assert "# our walker" in written
     assert "0.4" in written, "the previous value stays as a comment"

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from controller_tuning_page_cases import candidates, recordings
+from controller_tuning_page_cases import CONFIG, candidates, recordings
 
 from bridge.config.load import load_config
 from controller.tuning.page.bench import Bench
 
-CONFIG = "version = 1\n\n[intervention]\nprobability_onset = 0.4\n"
 WAIT_S = 10.0
 
 
@@ -162,7 +161,7 @@ def test_a_clicked_candidate_sets_its_thresholds(visit: Any) -> None:
 def test_a_file_changed_by_others_while_the_page_is_open_is_not_overwritten(visit: Any) -> None:
     async def does(person: Person) -> None:
         person.set("slider rise_per_s", 9.0)
-        others = CONFIG.replace("0.4", "0.5")
+        others = CONFIG.replace("0.4 ", "0.5 ")
         person.file.write_text(others)
         person.click("save")
         assert person.user.notify.contains("was changed since this page read it")
