@@ -9,6 +9,7 @@ import os
 import re
 import runpy
 import shlex
+import signal
 import subprocess
 import sys
 import tomllib
@@ -32,8 +33,9 @@ PATIENCE_S = 300
 
 def places() -> dict[str, str]:
     """Return options that keep a command away from whatever else runs on this machine, by the name of their place."""
-    ports = dict(zip(ROLES, free_ports(len(ROLES)), strict=True))
-    return {
+    *for_roles, port = free_ports(len(ROLES) + 1)
+    ports = dict(zip(ROLES, for_roles, strict=True))
+    return {"port": str(port)} | {
         protocol_name: "--set bridge.namespace=documented "
         + " ".join(f"--set bridge.endpoints.{role}={protocol}/127.0.0.1:{port}" for role, port in ports.items())
         for protocol_name, protocol in (("wire", "tcp"), ("tls", "tls"))
@@ -55,7 +57,7 @@ def execute(command: Documented, folder: Path, places: dict[str, str], *, apart:
     if words[0] == "surefoot" and not apart:
         code, out, err = _surefoot(words[1:], folder)
     elif words[0] in ("surefoot", "python", "python3", "torchrun"):
-        code, out, err = _process(words, folder)
+        code, out, err = _process(words, folder, known.stops_s)
     else:
         raise NotAsDocumentedError(f"{command.page}: `{command.text}` is not ours to execute: name it in ways.py")
     if code != known.code:
@@ -78,14 +80,18 @@ def _surefoot(words: list[str], folder: Path) -> tuple[int, str, str]:
     return code, out.getvalue(), err.getvalue()
 
 
-def _process(words: list[str], folder: Path) -> tuple[int, str, str]:
+def _process(words: list[str], folder: Path, stops_s: float) -> tuple[int, str, str]:
     binaries = Path(sys.executable).parent
     path = f"{REPO}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
     environment = {**os.environ, "PYTHONPATH": path, "PATH": f"{binaries}{os.pathsep}{os.environ['PATH']}"}
-    done = subprocess.run(
-        words, cwd=folder, env=environment, capture_output=True, text=True, timeout=PATIENCE_S, check=False
-    )
-    return done.returncode, done.stdout, done.stderr
+    pipe = subprocess.PIPE
+    with subprocess.Popen(words, cwd=folder, env=environment, stdout=pipe, stderr=pipe, text=True) as process:
+        try:
+            out, err = process.communicate(timeout=stops_s or PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGINT if stops_s else signal.SIGKILL)
+            out, err = process.communicate(timeout=60)
+    return process.returncode, out, err
 
 
 def parse(command: Documented) -> None:

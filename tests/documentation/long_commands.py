@@ -44,12 +44,14 @@ def test_long_commands_do_what_the_page_says(
 ) -> None:
     """In the page's order, with the quick ones between, whose files they may need."""
     commands = [command for command in COMMANDS if command.page == page and not command.is_name]
+    data = ""
     if any(way(command.text).data for command in commands if is_long(command)):
-        monkeypatch.setenv("SUREFOOT_DATA", str(request.getfixturevalue("data_dir").resolve()))
+        data = str(request.getfixturevalue("data_dir").resolve())
+        monkeypatch.setenv("SUREFOOT_DATA", data)
     for command in commands:
         known = way(command.text)
         if not (known.never or known.beside or command.words[0] == "make"):
-            execute(command, folder, places(), apart=known.long)
+            execute(command, folder, {**places(), "data": data}, apart=known.long)
 
 
 @pytest.mark.parametrize("target", TARGETS)

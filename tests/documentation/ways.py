@@ -20,9 +20,11 @@ class Way(NamedTuple):
     data: bool = False  # needs the research data
     never: bool = False  # executed nowhere
     code: int = 0  # its exit code
+    stops_s: float = 0.0  # it runs until Ctrl-C, which it is sent after so long; 0: it ends by itself
     says: str = ""  # what its output has to hold, where the exit code alone does not tell
 
 
+SHORT = "--no-screen --duration 15 {wire}"
 AT_WORK = "DISARMED|FOLLOW|GUARD|ARREST|SAFE_STOP"  # commands came
 QUICK = "--quick --folds 2"
 
@@ -30,8 +32,15 @@ WAYS: dict[str, Way] = {
     # the whole system
     r"surefoot up( --config FILE)?": Way("asks for a source", never=True),
     r"surefoot up .*(--source camera:|rtsp:).*": Way("needs a camera", never=True),
-    r"surefoot up .*examples/.*": Way("real processes; tests/examples runs them", never=True),
-    r"surefoot up .*--estimator (movenet|yolo).*": Way("needs a network that finds people", never=True),
+    r"surefoot up .*examples/alarm.*": Way("real processes, and no controller", SHORT, long=True, says="alarm running"),
+    r"surefoot up .*--estimator movenet.*": Way(
+        "real processes, with weights that come with the research data",
+        SHORT + " --set perception.movenet.weights={data}/weights/movenet_lightning_int8.tflite",
+        long=True,
+        data=True,
+        says=AT_WORK,
+    ),
+    r"surefoot up .*--estimator yolo.*": Way("needs a network that nobody may hand on", never=True),
     r"surefoot (up|router) --config (camera|walker)\.toml.*": Way(
         "two machines; tests/bridge/test_bridge_several_machines.py runs both files", never=True
     ),
@@ -39,9 +48,9 @@ WAYS: dict[str, Way] = {
         "real processes over TLS", "--no-screen --duration 15 --source clip.npz:walk {tls}", long=True, says=AT_WORK
     ),
     r"surefoot router .*": Way(
-        "runs until it is stopped; tests/bridge/test_bridge_processes_nodes.py runs it", never=True
+        "runs until it is stopped", "--set 'bridge.router.listen=[\"tls/127.0.0.1:{port}\"]'", long=True, stops_s=8
     ),
-    r"surefoot up .*": Way("real processes", "--no-screen --duration 15 {wire}", long=True, says=AT_WORK),
+    r"surefoot up .*": Way("real processes", SHORT, long=True, says=AT_WORK),
     r"surefoot (demo|rehearse).*": Way("real processes in real time", long=True),
     r"surefoot latency.*": Way("real processes, for some seconds", "--duration 3", long=True),
     r"surefoot \S+ .*--json FILE": Way("FILE stands for any file", "--json said.json"),
@@ -53,7 +62,7 @@ WAYS: dict[str, Way] = {
     r"surefoot view --serve": Way("beside a system; a page without a browser", "--duration 1 {beside}", beside=True),
     r"surefoot view \S+\.mcap( --video .*)?": Way("a file instead of a window", "--out shown.rrd --force"),
     r"surefoot replay \S+": Way("in real time, on ports of its own", "--delay 0 {wire}"),
-    r"python examples/.*": Way("runs until it is stopped; tests/examples runs it", never=True),
+    r"python examples/.*": Way("runs until it is stopped", "{wire}", long=True, stops_s=15),
     r"surefoot personalise( --.*)?": Way(
         "asks at the terminal; tests/controller/test_controller_personal_command.py answers", never=True
     ),
