@@ -43,16 +43,16 @@ class InterventionConfig(Section):
     """From this probability of transient and fall together on, distance and approach count fully."""
 
     unconfirmed_most: float = Field(default=0.7, ge=0, le=1)
-    """Largest risk by distance and approach alone; a fall foreseen with `probability_full` lifts the limit."""
+    """Largest risk by distance and approach, unless `probability_full` confirms it; and by a doubtful horizon."""
 
-    probability_onset: float = Field(default=0.35, ge=0, le=1)
+    probability_onset: float = Field(default=0.5, ge=0, le=1)
     """Probability of fall above which risk begins."""
 
-    probability_full: float = Field(default=0.8, ge=0, le=1)
+    probability_full: float = Field(default=0.9, ge=0, le=1)
     """Probability of fall at which the risk is full."""
 
     trusted_quality: float = Field(default=0.5, ge=0, le=1)
-    """A horizon of lower quality cannot lower the risk: what the last trusted horizon said still holds."""
+    """A horizon of lower quality is doubtful: it cannot lower the risk, and raises it to `unconfirmed_most` at most."""
 
     unknown_hold_s: float = Field(default=0.5, ge=0, le=5)
     """How long the last trusted horizon holds [s]; after that the person's state is unknown."""

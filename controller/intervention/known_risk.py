@@ -28,9 +28,10 @@ class _Curve(NamedTuple):
 class KnownRisk:
     """The risk over the time ahead, from the newest horizon and the newest trusted one.
 
-    A horizon of low quality may raise the risk but not lower it below what the last trusted
-    horizon foresaw: unknown is not stable. That memory is limited in time; after it the risk
-    has a floor (`unknown_risk`) until a trusted horizon comes.
+    A horizon of low quality may raise the risk, as far as what is not confirmed may
+    (`unconfirmed_most`), but not lower it below what the last trusted horizon foresaw: unknown is
+    not stable. That memory is limited in time; after it the risk has a floor (`unknown_risk`)
+    until a trusted horizon comes.
     """
 
     def __init__(self, config: InterventionConfig) -> None:
@@ -53,8 +54,10 @@ class KnownRisk:
         horizon = looked_at(horizon, max(self._config.steps_used, 1))
         self._horizon, self._risk = horizon, assess_risk(horizon, self._config)
         times_s = np.linspace(0.0, (STEPS - 1) * horizon.step_s, STEPS)
-        self._newest = _Curve(times_s, self._risk.total, start_ns)
-        if horizon.quality >= self._config.trusted_quality:
+        trusted = horizon.quality >= self._config.trusted_quality
+        total = self._risk.total if trusted else np.minimum(self._risk.total, self._config.unconfirmed_most)
+        self._newest = _Curve(times_s, total, start_ns)
+        if trusted:
             self._trusted = self._newest
 
     def ahead(self, now_ns: int, ahead_s: Floats) -> Floats:

@@ -80,7 +80,7 @@ def inputs(case: Case, supervisor: SupervisorConfig) -> Inputs:
 
 
 def risks(horizons: Horizons, config: InterventionConfig) -> Floats:
-    """Return the risk of each step of each horizon, (M, 16): `assess_risk` for all of them."""
+    """Return the risk of each step of each horizon, (M, 16): `assess_risk` for all, and `KnownRisk`'s doubt."""
     distance, rate, probabilities = horizons.distance, horizons.distance_rate, horizons.probabilities
     steps = max(config.steps_used, 1)
     if steps < STEPS:  # as `looked_at`
@@ -97,6 +97,8 @@ def risks(horizons: Horizons, config: InterventionConfig) -> Floats:
         near = ramp(distance, config.approach_far_sd, config.approach_near_sd)
         seen = np.minimum(np.maximum(by_distance, credible * soon * near), most)
         risk: Floats = np.maximum(seen, by_probability)
+    doubtful = horizons.quality < config.trusted_quality
+    risk[doubtful] = np.minimum(risk[doubtful], config.unconfirmed_most)
     return risk
 
 

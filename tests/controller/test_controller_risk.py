@@ -137,7 +137,7 @@ class TestConfig:
             ("intervention.distance_full_sd=2.0", "distance_full_sd = 2 must be below distance_onset_sd = 1.5"),
             ("intervention.approach_full_s=0.8", "approach_full_s = 0.8 must be below approach_onset_s = 0.8"),
             ("intervention.approach_near_sd=4", "approach_near_sd = 4 must be below approach_far_sd = 3.5"),
-            ("intervention.probability_full=0.2", "probability_onset = 0.35 must be below probability_full = 0.2"),
+            ("intervention.probability_full=0.2", "probability_onset = 0.5 must be below probability_full = 0.2"),
             ("intervention.release_per_s=9", "release_per_s = 9 must be below rise_per_s = 8"),
             ("supervisor.guard_off=0.25", "guard_off = 0.25 must be below guard_on = 0.25"),
             ("supervisor.arrest_off=0.9", "arrest_off = 0.9 must be below arrest_on = 0.8"),
@@ -237,6 +237,13 @@ class TestKnownRisk:
         known.update(horizon(fall=0.9, quality=0.1), NS)
         assert known.ahead(NS, NOW)[0] == 1.0
         assert known.words(NS, 0.0, 1.0) == "fall probability 0.90"
+
+    def test_an_untrusted_alarm_alone_guards_and_does_not_arrest(self) -> None:
+        known = KnownRisk(DEFAULTS)
+        known.update(horizon(fall=1.0, quality=0.49), NS)
+        assert SupervisorConfig().guard_on < known.ahead(NS, NOW)[0] == DEFAULTS.unconfirmed_most
+        known.update(horizon(NS + MS, fall=1.0, quality=0.5), NS + MS)
+        assert known.ahead(NS + MS, NOW)[0] == 1.0
 
     def test_reconfigure_judges_the_newest_horizon_again(self) -> None:
         known = self.make()
