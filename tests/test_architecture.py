@@ -26,6 +26,7 @@ CONFINED = {
     "daqp": ("controller/mpc/",),
     "piqp": ("controller/mpc/",),
     "pinocchio": ("controller/walker.py",),
+    "nicegui": ("controller/tuning/page/",),
     "pickle": (),
 }
 WIRE = ("bridge.transport", "bridge.inbox", "bridge.outbox", "bridge.node")

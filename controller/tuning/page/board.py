@@ -77,7 +77,7 @@ class Board:
         with ui.header().classes("bar"):
             ui.label("Surefoot").classes("brand")
             ui.label("tune").classes("brand-quiet")
-            target = "no file to save to" if bench.save_to is None else str(bench.save_to)
+            target = "no --config: nothing can be saved" if bench.save_to is None else str(bench.save_to)
             ui.label(f"\u200e{target}\u200e").classes("target")  # cut at its beginning, but read from left to right
             ui.space()
             ui.button(icon="contrast", on_click=self._toggle_dark).props('flat round dense aria-label="dark or light"')

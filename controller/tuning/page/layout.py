@@ -24,7 +24,7 @@ class Layout(NamedTuple):
     @property
     def right(self) -> int:
         """Room for the names of thresholds; on a phone they lie in the panels."""
-        return 152 if self.wide else 10
+        return 152 if self.wide else 16
 
     @property
     def panel(self) -> int:

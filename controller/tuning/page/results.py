@@ -26,12 +26,17 @@ class Tiles:
 
     def show(self, now: Outcome, file: Outcome) -> None:
         """Show the counts of the page's setting, and what the file's are where they differ."""
-        self._caught.show(words.caught_words(now), _was(words.caught_words(now), words.caught_words(file)))
+        self._caught.show(
+            words.caught_words(now), words.share_words(now), _was(words.caught_words(now), words.caught_words(file))
+        )
         self._caught.judge(now.caught_share - file.caught_share)
-        self._lead.show(words.lead_words(now), _was(words.lead_words(now), words.lead_words(file)))
+        self._lead.show(words.lead_words(now), "", _was(words.lead_words(now), words.lead_words(file)))
         self._lead.judge(now.lead_median_s - file.lead_median_s)
-        before = _was(words.needless_words(now), words.needless_words(file))
-        self._needless.show(words.needless_words(now), " · ".join(filter(None, (words.rate_words(now), before))))
+        self._needless.show(
+            words.needless_words(now),
+            words.rate_words(now),
+            _was(words.needless_words(now), words.needless_words(file)),
+        )
         self._needless.judge(file.per_hour - now.per_hour)
         self._progress.set_text("")
 
@@ -67,11 +72,13 @@ class _Tile:
         with ui.element("div").classes("tile") as self._frame:
             ui.label(title).classes("tile-title")
             self._value = ui.label("…").classes("tile-value").mark(name).props(f'data-count="{name}"')
-            self._remark = ui.label("").classes("tile-remark")
+            self._certainty = ui.label("").classes("tile-remark")
+            self._before = ui.label("").classes("tile-before")
 
-    def show(self, value: str, remark: str) -> None:
+    def show(self, value: str, certainty: str, before: str) -> None:
         self._value.set_text(value)
-        self._remark.set_text(remark)
+        self._certainty.set_text(certainty)
+        self._before.set_text(before)
 
     def judge(self, gain: float) -> None:
         """Colour the tile by whether the page's setting is better than the file's."""

@@ -40,6 +40,14 @@ TITLES: Final = {
 }
 
 
+READING: Final = """points => {
+  const known = points.filter(p => p.value[1] != null).sort((a, b) => a.seriesIndex - b.seriesIndex);
+  const lines = known.map(p => p.marker + p.seriesName + ' <b>' + (+p.value[1]).toFixed(2) + '</b>');
+  return '<div style="font-size: 11px; line-height: 1.35">'
+    + ['<b>' + (+points[0].axisValue).toFixed(2) + ' s</b>', ...lines].join('<br>') + '</div>';
+}"""
+
+
 class Curve(NamedTuple):
     """One quantity over time."""
 
@@ -74,12 +82,12 @@ def timeline_options(
     """
     lines = thresholds(config, palette)
     ranges = _ranges(run, lines[DISTANCE])
-    shown = curves(run, palette)
+    shown = curves(run, config.supervisor.horizon_age_limit_s, palette)
     return {
         **NO_ANIMATION,
         "textStyle": {"color": palette.ink},
         "axisPointer": {"link": [{"xAxisIndex": "all"}], "lineStyle": {"color": palette.quiet}},
-        "tooltip": tooltip(palette, trigger="axis", **{":valueFormatter": "v => v == null ? '–' : (+v).toFixed(2)"}),
+        "tooltip": tooltip(palette, trigger="axis", padding=[6, 9], **{":formatter": READING}),
         "grid": [
             {
                 "left": layout.left,
@@ -98,12 +106,12 @@ def timeline_options(
     }
 
 
-def curves(run: Run, palette: Palette) -> list[Curve]:
+def curves(run: Run, age_limit_s: float, palette: Palette) -> list[Curve]:
     """Return what is drawn: what was foreseen at its arrival, what was made of it at each turn of the controller."""
     horizons, times_s = run.case.horizons, run.times_s
     at_s = (horizons.stream.arrival_ns - run.case.start_ns) / NS
     good = _usable(run)
-    gap = np.where(good, 0.0, np.nan)
+    gap, quality = np.where(good, 0.0, np.nan), np.where(good, horizons.quality, 0.0)
     fall, not_stable = horizons.probabilities[:, :, 2], 1.0 - horizons.probabilities[:, :, 0]
     return [
         Curve("now", DISTANCE, at_s, horizons.distance[:, 0] + gap, palette.ink),
@@ -114,8 +122,16 @@ def curves(run: Run, palette: Palette) -> list[Curve]:
         Curve("largest ahead", RISK, times_s, run.risk_ahead, palette.ahead, dashed=True),
         Curve("within reach of ARREST", RISK, times_s, run.risk_near, palette.ink),
         Curve("stiffening", STIFFENING, times_s, run.stiffening, palette.stiffening, filled=True),
-        Curve("quality", STIFFENING, at_s, np.where(good, horizons.quality, 0.0), palette.quiet),
+        Curve("quality", STIFFENING, times_s, _held(at_s, quality, times_s, age_limit_s), palette.quiet),
     ]
+
+
+def _held(at_s: Floats, value: Floats, times_s: Floats, limit_s: float) -> Floats:
+    """Return at `times_s` what came last in `value` at `at_s`; NaN before the first, and past the limit of age."""
+    newest = np.searchsorted(at_s, times_s, side="right") - 1
+    if not len(at_s):
+        return np.full(len(times_s), np.nan)
+    return np.where((newest >= 0) & (times_s - at_s[newest] <= limit_s), value[newest], np.nan)
 
 
 def _usable(run: Run) -> NDArray[np.bool_]:

@@ -67,7 +67,7 @@ def tradeoff_options(
         ],
         "graphic": [
             _title("falls caught", 32, palette),
-            _title("lead: ARREST before the impact, median [s]", 200, palette),
+            _title("lead: intervention before the impact, median [s]", 200, palette),
         ],
         "xAxis": [
             axis(palette, type="value", gridIndex=0, min=0, max=right, axisLabel={"show": False}),

@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 
 from bridge.messages import GaitState
 from controller.tuning.cases import Case
+from controller.tuning.confidence import poisson, wilson
 from controller.tuning.page.tradeoff_chart import Point
 from controller.tuning.replay import Run
 from controller.tuning.score import Outcome, Tally
@@ -78,9 +79,18 @@ def needless_words(outcome: Outcome) -> str:
     return f"{outcome.needless} in {duration_words(outcome.hours * 3600.0)}"
 
 
+def share_words(outcome: Outcome) -> str:
+    """Return what the falls caught say about falls to come: a 95 % interval."""
+    share = wilson(outcome.caught, outcome.falls)
+    return f"95 %: {100.0 * share.low:.0f} to {100.0 * share.high:.0f} %" if outcome.falls else ""
+
+
 def rate_words(outcome: Outcome) -> str:
-    """Return the needless interventions per hour."""
-    return f"{outcome.per_hour:.3g} per hour" if math.isfinite(outcome.per_hour) else "no time to count in"
+    """Return the needless interventions per hour with a 95 % interval."""
+    rate = poisson(outcome.needless, outcome.hours)
+    if not math.isfinite(rate.value):
+        return "no time to count in"
+    return f"{rate.value:.3g} per hour, 95 %: {rate.low:.3g} to {rate.high:.3g}"
 
 
 def point(name: str, outcome: Outcome | None) -> Point:
