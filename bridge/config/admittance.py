@@ -44,8 +44,8 @@ class AdmittanceConfig(Section):
     damping_arrest_yaw_nms_rad: float = Field(default=80.0, ge=0.1, le=5000)
     """Damping about the vertical in an arrest [N m s/rad]."""
 
-    damping_arrest_height_ns_m: float = Field(default=4000.0, ge=1, le=100000)
-    """Damping of the column in an arrest: about critical with 100 kg hanging on it [N s/m]."""
+    damping_arrest_height_ns_m: float = Field(default=6000.0, ge=1, le=100000)
+    """Damping of the column in an arrest: 1.2 times critical with 100 kg hanging on it [N s/m]."""
 
     stiffness_arrest_horizontal_n_m: float = Field(default=3000.0, ge=0, le=100000)
     """Forward and sideward stiffness in an arrest [N/m]: 150 N of stumbling push give 5 cm."""
@@ -53,8 +53,8 @@ class AdmittanceConfig(Section):
     stiffness_arrest_yaw_nm_rad: float = Field(default=250.0, ge=0, le=10000)
     """Stiffness about the vertical in an arrest [N m/rad]."""
 
-    stiffness_arrest_height_n_m: float = Field(default=30000.0, ge=0, le=500000)
-    """Stiffness of the column in an arrest [N/m]: 100 kg hanging give 3.3 cm, leaving 6.7 of 10 for the catch."""
+    stiffness_arrest_height_n_m: float = Field(default=60000.0, ge=0, le=500000)
+    """Stiffness of the column in an arrest [N/m]: 100 kg hanging give 1.6 cm, leaving 8.4 of 10 for the catch."""
 
     stiffness_hold_height_n_m: float = Field(default=1500.0, ge=0, le=50000)
     """Stiffness that always holds the column near `height_hold_m` [N/m]: 30 N of leaning give 2 cm."""

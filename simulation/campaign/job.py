@@ -8,9 +8,10 @@ from typing import Any, Final, NamedTuple
 from bridge.config.surefoot import SurefootConfig
 from bridge.record.layout import SUFFIX
 from simulation.campaign.checks import failed
+from simulation.campaign.measures import Measures
 from simulation.campaign.trace import Trace
 from simulation.campaign.trial import run_trial
-from simulation.scenarios.drawing import draw_checked
+from simulation.scenarios.drawing import Drawn, draw_checked
 from simulation.scenarios.scenario import Kind
 
 EVERY: Final = 5  # turns between two points of a kept curve: 20 ms
@@ -35,12 +36,13 @@ class Job(NamedTuple):
 
 def perform(job: Job) -> dict[str, Any]:
     """Return the result of `job` as plain values: the scenario, and the numbers and curves of each arm."""
-    drawn = draw_checked(job.kind, job.number, job.seed)
+    drawn, alone = _drawn(job)
     scenario, course = drawn.scenario, drawn.course
     trials: dict[str, Any] = {}
     for arm in job.arms:
         keep = job.recordings / f"{job.name}.{arm}{SUFFIX}" if arm == job.recorded else None
-        measures, trace = run_trial(scenario, arm, job.config, keep)
+        done = alone if arm == "none" and keep is None else None
+        measures, trace = done or run_trial(scenario, arm, job.config, keep)
         trials[arm] = {
             "measures": measures.row(), "failed_checks": failed(scenario, measures), "curves": _curves(trace),
         }  # fmt: skip
@@ -64,6 +66,21 @@ def perform(job: Job) -> dict[str, Any]:
         },
         "trials": trials,
     }
+
+
+def _drawn(job: Job) -> tuple[Drawn, tuple[Measures, Trace] | None]:
+    """Return a draw that is what it claims to be, and for a non-fall its trial in the walker without intervention.
+
+    Who stays up alone may still fall over the walker that follows: that is a fall, and no arrest of it is needless.
+    """
+    drawn = draw_checked(job.kind, job.number, job.seed)
+    if job.kind == "fall":
+        return drawn, None
+    while True:
+        alone = run_trial(drawn.scenario, "none", job.config)
+        if not alone[0].went_down:
+            return drawn, alone
+        drawn = draw_checked(job.kind, job.number, job.seed, drawn.rejected + 1)
 
 
 def _curves(trace: Trace) -> dict[str, list[float]]:

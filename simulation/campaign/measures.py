@@ -22,6 +22,7 @@ STIFF: Final = 0.2  # stiffening that a person feels
 LOW_M: Final = 0.04  # below walking height: a descent
 COMING_DOWN_M_S: Final = 0.1
 SEEN: Final = 0.5  # probability of fall that counts as seen or foreseen
+HUNG_S: Final = 0.5  # with more than half of the weight in the harness: nobody does that on purpose for so long
 QUIET_S: Final = 3.0  # free walking is judged from here on: the stack is up and the person walks
 ARREST, GUARD, STOP = (float(STATES.index(s)) for s in (GaitState.ARREST, GaitState.GUARD, GaitState.SAFE_STOP))
 
@@ -38,6 +39,7 @@ class Measures:
     peak_rate_n_s: float  # fastest change of that force, over 20 ms
     tilt_rad: float
     tipped: bool
+    hung_s: float  # longest time with more than half of the weight in the harness
     arrests: int
     guards: int
     stops: int
@@ -52,6 +54,11 @@ class Measures:
     walked_m: float
     rms_force_n: float  # horizontal, in free walking; NaN where nobody walked
     energy_j_m: float  # that the person spends on the walker for a metre of free walking
+
+    @property
+    def went_down(self) -> bool:
+        """Whether the person came to lie or to hang, whatever the scenario meant to be."""
+        return self.touched or self.hung_s >= HUNG_S
 
     def row(self) -> dict[str, Any]:
         """Return the numbers by name."""
@@ -91,6 +98,7 @@ def measure(scenario: Scenario, trace: Trace, disturbed_s: float | None, standin
         peak_rate_n_s=float(np.max(np.abs(size[5:] - size[:-5]) / 0.02, where=after[5:], initial=0.0)),
         tilt_rad=tilt,
         tipped=tilt > TIPPED_RAD,
+        hung_s=_longest(t, -trace.force_n[:, 2] > 0.5 * 9.81 * scenario.size.mass_kg),
         arrests=_entries(trace.state, ARREST),
         guards=_entries(trace.state, GUARD),
         stops=_entries(trace.state[t > 1.5], STOP),
@@ -128,6 +136,13 @@ def _stiffened(trace: Trace, began_s: float, descent_s: float) -> float:
     while held > 0 and stiff[held - 1] and trace.time_s[held - 1] >= began_s:
         held -= 1
     return float(trace.time_s[held])
+
+
+def _longest(times: Floats, holds: Any) -> float:
+    """Return for how long `holds` was true without a break, at most [s]."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], holds.astype(np.int64), [0]))))
+    spans = times[edges[1::2] - 1] - times[edges[::2]]
+    return float(spans.max(initial=0.0))
 
 
 def _first(times: Floats, holds: Any) -> float:

@@ -30,13 +30,13 @@ def draw(kind: Kind, number: int, seed: int, attempt: int = 0) -> Scenario:
     return families[number % len(families)](rng, size, ability)
 
 
-def draw_checked(kind: Kind, number: int, seed: int) -> Drawn:
-    """Return the first draw that falls without help if it is a fall, and does not if it is none.
+def draw_checked(kind: Kind, number: int, seed: int, first: int = 0) -> Drawn:
+    """Return the first draw from `first` on that falls without help if it is a fall, and does not if it is none.
 
     Raises:
         SurefootError: none of many draws was what it claimed to be.
     """
-    for attempt in range(MOST_DRAWS):
+    for attempt in range(first, MOST_DRAWS):
         scenario = draw(kind, number, seed, attempt)
         course = unassisted(scenario)
         if course.fell == (kind == "fall"):

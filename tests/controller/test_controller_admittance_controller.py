@@ -93,7 +93,7 @@ def test_the_column_holds_its_height_and_carries_a_person_who_falls_into_the_har
     np.testing.assert_allclose(loop.pose[3], 1.0, atol=1e-3)
     loop.run(1.5, [0, 0, -981.0, 0, 0, 0], 1.0, state=GaitState.ARREST)
     drop = 1.0 - loop.pose[3]
-    assert 0.02 < drop < 0.10
+    assert 0.01 < drop < 0.10
     assert abs(loop.velocity[3]) < 1e-2
 
 

@@ -46,7 +46,9 @@ def test_the_straps_bear_and_no_more(s: float) -> None:
     person = standing()
     before = float(person.loop.pose[3])
     heights = person.stand(1.5, s)
-    assert 0.1 * s * CONFIG.take_up_force_n < person.load_n() <= s * CONFIG.take_up_force_n + 10.0
+    assert (
+        0.1 * s * CONFIG.take_up_force_n < person.load_n() <= 1.2 * s * CONFIG.take_up_force_n + 10.0
+    )  # half a millimetre of strap
     assert heights[-1] - before == pytest.approx(SLACK_M, abs=0.004)
 
 

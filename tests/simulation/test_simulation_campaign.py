@@ -14,16 +14,17 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet
 import pytest
-from campaign_results import measured, quick
+from campaign_results import measured, quick, trace
 
 from bridge.cli import main
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import ConfigError, SurefootError
 from simulation.campaign import workers
 from simulation.campaign.campaign import Plan, run_campaign
-from simulation.campaign.job import Job
+from simulation.campaign.job import Job, perform
 from simulation.campaign.statistics import percentile, share
 from simulation.campaign.summary import summarise
+from simulation.scenarios.scenario import Scenario
 
 ASKED = {
     "falls", "falls_arrested", "non_falls", "needless_arrests", "tip_overs", "pelvis_drop_p95_m",
@@ -72,6 +73,31 @@ def test_a_stiffening_before_the_disturbance_counts_from_the_disturbance() -> No
 def test_nothing_happened_is_no_number() -> None:
     m = measured(0.0)
     assert np.isnan([m.descent_s, m.lead_s, m.arrest_s]).all()
+
+
+def test_who_hangs_or_lies_has_gone_down() -> None:
+    assert measured(0.09).hung_s == pytest.approx(0.65, abs=0.02)  # half of the weight from 1.35 to 2 s
+    assert measured(0.09).went_down
+    assert measured(0.05, 1.3, touched=True, down_s=1.9).went_down
+    assert not measured(0.09, down_s=1.8).went_down
+    assert not measured(0.0, kind="non_fall").went_down
+
+
+def test_a_non_fall_that_falls_over_the_walker_is_drawn_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[str, str]] = []
+
+    def trial(scenario: Scenario, arm: str, config: SurefootConfig, keep: Path | None = None) -> Any:
+        asked.append((scenario.title, arm))
+        hangs = scenario.title == asked[0][0]
+        return measured(0.09 if hangs else 0.0, kind="non_fall"), trace(0.0)
+
+    monkeypatch.setattr("simulation.campaign.job.run_trial", trial)
+    job = Job("non_fall", 0, 7, ("none", "reactive"), SurefootConfig())
+    result = perform(job)
+    assert result["scenario"]["rejected_draws"] == 1
+    first, second = asked[0][0], asked[1][0]
+    assert first != second == result["scenario"]["title"]
+    assert asked == [(first, "none"), (second, "none"), (second, "reactive")]
 
 
 def test_intervals() -> None:
