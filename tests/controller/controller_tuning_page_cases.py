@@ -11,7 +11,6 @@ import numpy as np
 
 from bridge.config.load import load_config, parse_config
 from bridge.config.surefoot import SurefootConfig
-from bridge.exit_codes import ExitCode
 from controller.tuning.cases import Case, Fall, Horizons, stream
 from controller.tuning.page.bench import Bench, Candidate
 from controller.tuning.replay import replay
@@ -152,7 +151,4 @@ if __name__ == "__main__":
     shown = many_recordings() if "many" in sys.argv else recordings()
     candidates_ = tried(shown, loaded) if "many" in sys.argv else candidates()
     bench = Bench(shown, loaded, config, config, candidates=candidates_, budget_per_h=BUDGET_PER_H)
-    try:
-        serve(bench, 0)
-    except KeyboardInterrupt:  # as the command line has it
-        raise SystemExit(ExitCode.INTERRUPTED) from None
+    raise SystemExit(serve(bench, 0))

@@ -6,7 +6,7 @@ import http.client
 import re
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -30,13 +30,6 @@ def wait(seen: Callable[[], Any]) -> Any:
     return found
 
 
-@pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    page = Served(tmp_path_factory.mktemp("served"))
-    yield page
-    page.end()
-
-
 def get(served: Served, path: str, **headers: str) -> http.client.HTTPResponse:
     address = urlsplit(served.address(wait))
     connection = http.client.HTTPConnection("127.0.0.1", address.port, timeout=WAIT_S)
@@ -48,7 +41,8 @@ def get(served: Served, path: str, **headers: str) -> http.client.HTTPResponse:
 
 
 @pytest.mark.processes
-def test_the_printed_address_opens_the_page_and_everything_in_it_comes_from_here(served: Served) -> None:
+def test_the_printed_address_opens_the_page_all_of_it_comes_from_here_and_ctrl_c_ends_it(tmp_path: Path) -> None:
+    served = Served(tmp_path)
     address = urlsplit(served.address(wait))
     assert address.hostname == "127.0.0.1"
     assert get(served, "/").status == 403
@@ -67,14 +61,8 @@ def test_the_printed_address_opens_the_page_and_everything_in_it_comes_from_here
         assert get(served, path, Cookie=cookie).status == 200
     assert get(served, "/", Cookie=cookie, Host="evil.example").status == 403
     assert get(served, "/nowhere", Cookie=cookie).status == 404
-
-
-@pytest.mark.processes
-def test_ctrl_c_ends_it_without_a_traceback(tmp_path: Path) -> None:
-    page = Served(tmp_path)
-    page.address(wait)
-    assert page.end() == 130
-    assert "Traceback" not in page.said.read_text()
+    assert served.end() == 0
+    assert "Traceback" not in served.said.read_text()
 
 
 def test_it_listens_on_this_machine_alone() -> None:

@@ -63,6 +63,9 @@ WAYS: dict[str, Way] = {
     r"surefoot view \S+\.mcap( --video .*)?": Way("a file instead of a window", "--out shown.rrd --force"),
     r"surefoot replay \S+": Way("in real time, on ports of its own", "--delay 0 {wire}"),
     r"python examples/.*": Way("runs until it is stopped", "{wire}", long=True, stops_s=15),
+    r"surefoot tune .*--serve.*": Way(
+        "serves a page until it is stopped", "--port 0", long=True, stops_s=30, says="open http://127.0.0.1:"
+    ),
     r"surefoot personalise( --.*)?": Way(
         "asks at the terminal; tests/controller/test_controller_personal_command.py answers", never=True
     ),

@@ -6,6 +6,7 @@ import logging
 import secrets
 import socket
 import warnings
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
@@ -89,4 +90,5 @@ def _run(bench: Bench, listening: socket.socket, key: str, address: str) -> None
     note(f"open {address}   (Ctrl-C ends it)")
     with warnings.catch_warnings():  # at its start the library looks at every object there is, torch's old ones too
         warnings.simplefilter("ignore", FutureWarning)
-        uvicorn.Server(config).run(sockets=[listening])
+        with suppress(KeyboardInterrupt):  # the ordinary end
+            uvicorn.Server(config).run(sockets=[listening])
