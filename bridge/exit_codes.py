@@ -23,5 +23,5 @@ MEANINGS: Final = {
     ExitCode.BAD_INPUT: "bad input, or an environment that cannot serve; one line on stderr says what",
     ExitCode.FAULT: "a fault of Surefoot itself, with a traceback: please report it",
     ExitCode.INTERRUPTED: "interrupted with Ctrl-C",
-    ExitCode.READER_GONE: "whoever read stdout has gone, as in `| head`",
+    ExitCode.READER_GONE: "whoever read stdout has gone, such as head",
 }

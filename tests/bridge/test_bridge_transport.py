@@ -162,24 +162,29 @@ def test_a_frozen_process_is_missed_long_before_zenohs_own_ten_seconds() -> None
 def test_a_slow_reader_never_blocks_the_writer() -> None:
     config, clock = bridge_config(), SystemClock()
     writer, reader = ZenohTransport(config, "drive", clock), ZenohTransport(config, "controller", clock)
-    arrived, longest_s = threading.Event(), 0.0
+    arrived, released, written = threading.Event(), threading.Event(), threading.Event()
 
-    def dawdle(_sample: Sample) -> None:
+    def stuck(_sample: Sample) -> None:
         arrived.set()
-        time.sleep(0.5)
+        released.wait(60.0)
 
-    reader.subscribe(WRENCH, dawdle)
+    reader.subscribe(WRENCH, stuck)
     publisher, payload = writer.publisher(WRENCH), bytes(16_384)
-    try:
-        assert until(lambda: publisher.put(payload, 0) or arrived.is_set())
+
+    def write() -> None:
         for _ in range(1000):  # far more than the buffers of both ends hold
-            before = time.monotonic()
             publisher.put(payload, 0)
-            longest_s = max(longest_s, time.monotonic() - before)
-            if longest_s > 0.4:
-                break
-        # a reader stuck for half a second per sample would hold a blocking writer for that long
-        assert longest_s < 0.4
+        written.set()
+
+    writing = threading.Thread(target=write, daemon=True)
+    try:
+        while not arrived.wait(0.01):
+            publisher.put(payload, 0)
+        writing.start()
+        assert written.wait(30.0), "a reader that is stuck in its first sample holds the writer"
     finally:
+        released.set()
+        if writing.ident is not None:
+            writing.join(30.0)
         writer.close()
         reader.close()
