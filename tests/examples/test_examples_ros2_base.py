@@ -116,7 +116,7 @@ class Bench:
             if speak:
                 self.base.say(now_ns)
             if command_it:
-                self.commands.send(command(now_ns, forward))
+                self.commands.send(command(now_ns, forward, velocity=np.array([forward, 0.0, 0.0, 0.05])))
             self.node.step(now_ns)
             time.sleep(0.005)
 
@@ -135,7 +135,7 @@ def test_both_sides_hear_each_other(bench: Bench) -> None:
     bench.until(lambda: bench.base.heard.is_set() and bench.base.twist.twist.linear.x > 0.3)
     twist = bench.base.twist
     assert twist.header.frame_id == "base_link"
-    assert (twist.twist.linear.z, twist.twist.angular.z) == (0.0, 0.0)
+    assert (twist.twist.linear.z, twist.twist.angular.z) == (0.0, 0.0), "it has no column"
     now_ns = bench.clock.now_ns()
     bench.until(lambda: bench.odometry.read(bench.clock.now_ns()).ok and bench.wrench.read(bench.clock.now_ns()).ok)
     pose = bench.odometry.read(now_ns).message
@@ -152,6 +152,10 @@ def test_a_base_that_falls_silent_is_named_and_nothing_old_is_said_again(bench: 
     bench.until(lambda: bench.odometry.read(bench.clock.now_ns()).ok)
     bench.until(lambda: "the base: odom is" in bench.node.status(bench.clock.now_ns()).summary, speak=False)
     bench.until(lambda: bench.odometry.read(bench.clock.now_ns()).fault.startswith("odom is"), speak=False)
+    turns, said = iter(range(20)), bench.odometry.accepted + bench.odometry.refused
+    bench.until(lambda: next(turns, None) is None, speak=False)
+    bench.odometry.read(bench.clock.now_ns())
+    assert bench.odometry.accepted + bench.odometry.refused == said
 
 
 def test_without_commands_the_base_is_braked(bench: Bench) -> None:
