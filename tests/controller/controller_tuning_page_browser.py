@@ -40,7 +40,7 @@ def missing() -> str:
 
 @contextmanager
 def browsing(profile: Path) -> Iterator[Any]:
-    """Give a browser with an empty profile that writes down what it asks for and complains of."""
+    """Give a browser with an empty profile that writes down what it complains of."""
     from selenium import webdriver
     from selenium.webdriver.chrome.service import Service
 
@@ -48,7 +48,7 @@ def browsing(profile: Path) -> Iterator[Any]:
     options.binary_location = next(filter(None, map(shutil.which, BROWSERS)))
     for flag in (*FLAGS, f"--user-data-dir={profile}"):
         options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     service = Service(shutil.which("chromedriver"))
     browser = webdriver.Chrome(options=options, service=service)
     try:

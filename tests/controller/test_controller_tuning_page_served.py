@@ -43,25 +43,28 @@ def get(served: Served, path: str, **headers: str) -> http.client.HTTPResponse:
 @pytest.mark.processes
 def test_the_printed_address_opens_the_page_all_of_it_comes_from_here_and_ctrl_c_ends_it(tmp_path: Path) -> None:
     served = Served(tmp_path)
-    address = urlsplit(served.address(wait))
-    assert address.hostname == "127.0.0.1"
-    assert get(served, "/").status == 403
-    first = get(served, f"/?{address.query}")
-    assert (first.status, first.getheader("Location")) == (303, "/")
-    cookie = str(first.getheader("Set-Cookie")).split(";")[0]
-    page = get(served, "/", Cookie=cookie)
-    assert page.status == 200
-    text = page.text
-    foreign = re.findall(r"""(?:src|href|import|url|from)\s*[=(]?\s*["'(](?:https?:)?//[^"')]+""", text)
-    assert foreign == []
-    scripts = re.findall(r'src="(/[^"]+\.js)"', text)
-    assert scripts
-    for path in scripts:
-        assert get(served, path).status == 403, "not even a part of the page without the key"
-        assert get(served, path, Cookie=cookie).status == 200
-    assert get(served, "/", Cookie=cookie, Host="evil.example").status == 403
-    assert get(served, "/nowhere", Cookie=cookie).status == 404
-    assert served.end() == 0
+    try:
+        address = urlsplit(served.address(wait))
+        assert address.hostname == "127.0.0.1"
+        assert get(served, "/").status == 403
+        first = get(served, f"/?{address.query}")
+        assert (first.status, first.getheader("Location")) == (303, "/")
+        cookie = str(first.getheader("Set-Cookie")).split(";")[0]
+        page = get(served, "/", Cookie=cookie)
+        assert page.status == 200
+        text = page.text
+        foreign = re.findall(r"""(?:src|href|import|url|from)\s*[=(]?\s*["'(](?:https?:)?//[^"')]+""", text)
+        assert foreign == []
+        scripts = re.findall(r'src="(/[^"]+\.js)"', text)
+        assert scripts
+        for path in scripts:
+            assert get(served, path).status == 403, "not even a part of the page without the key"
+            assert get(served, path, Cookie=cookie).status == 200
+        assert get(served, "/", Cookie=cookie, Host="evil.example").status == 403
+        assert get(served, "/nowhere", Cookie=cookie).status == 404
+    finally:
+        ended = served.end()
+    assert ended == 0
     assert "Traceback" not in served.said.read_text()
 
 
