@@ -31,6 +31,7 @@ GRAVITY: Final = 9.81
 LIMP_KD: Final = 1.0
 URGE_GAIN: Final = 0.08  # per step
 URGE_MOST_M_S: Final = 0.12
+TALL_M: Final = 0.008  # above standing: the swinging leg lifts the centre of mass, not the hips
 RAISE_GAIN: Final = 0.3  # per step
 RAISE_MOST_M: Final = 0.06
 DEEPENS_M_S: Final = 0.1  # how fast the dip of the body follows the length of the steps
@@ -149,7 +150,7 @@ class Person:
         wave = self._bob()
         height = self.standing_height_m - self._crouch - wave.low_m
         self._sagged += height - float(com[2])
-        height += self._raised
+        height += self._raised + (0.0 if self._standing else TALL_M)
         lift = g.lift_1_s2 * (height - float(com[2])) - g.lift_1_s * (float(com_velocity[2]) + wave.sinking_m_s)
         lift = wave.upward_m_s2 + min(max(lift, -6.0), 6.0)
         vertical = self.size.mass_kg * max(GRAVITY + lift, 2.0)

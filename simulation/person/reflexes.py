@@ -30,8 +30,8 @@ class Reflexes:
     trunk_nms_rad: float = 59.7
     turn_nm_rad: float = 121.0
     turn_nms_rad: float = 12.5
-    lift_1_s2: float = 46.0  # height of the centre of mass: stiffness over mass
-    lift_1_s: float = 12.0
+    lift_1_s2: float = 60.0  # height of the centre of mass: stiffness over mass
+    lift_1_s: float = 15.0
     arm_swing_rad: float = 0.484
     arm_nm_rad: float = 49.6
     arm_nms_rad: float = 9.38

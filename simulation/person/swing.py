@@ -22,7 +22,7 @@ FASTEST_RAD_S: Final = 15.0
 FASTER_RAD_S2: Final = 150.0
 SMOOTH: Final = 0.25  # share of a new acceleration that is taken over in each turn
 AHEAD: Final = 0.5  # share of the torque for the wanted acceleration that is given ahead
-BENT: Final = 0.985  # longest swinging leg, of the stretched one: no knee locks in the air
+BENT: Final = 0.992  # longest swinging leg, of the stretched one: no knee locks in the air
 LATE_M_S: Final = 1.0  # how fast a foot that should stand already is put down
 LATE_MOST_M: Final = 0.08
 
