@@ -40,19 +40,13 @@ class SupervisorConfig(Section):
     """How long risk, load and descent must all be low before ARREST ends [s]."""
 
     harness_load_arrest_n: float = Field(default=300.0, gt=0, le=5000)
-    """Downward pull at the interface that is a fall unless vision is sure of the contrary [N]; leaning is up to 200."""
-
-    harness_load_calm_n: float = Field(default=500.0, gt=0, le=5000)
-    """Downward pull that is a fall whatever vision says [N]; a strap that snaps taut gets there 10 ms later."""
+    """Downward pull at the interface that is a fall, whatever vision says [N]; leaning stays below about 200 N."""
 
     harness_load_release_n: float = Field(default=150.0, ge=0, le=5000)
     """Downward pull below which an arrest may end [N]."""
 
     descent_arrest_m_s: float = Field(default=0.30, gt=0, le=5)
-    """Downward speed of the support column that is a fall unless vision is sure of the contrary [m/s]."""
-
-    descent_calm_m_s: float = Field(default=0.38, gt=0, le=5)
-    """Downward speed of the support column that is a fall whatever vision says [m/s]."""
+    """Downward speed of the support column that is a fall, whatever vision says [m/s]."""
 
     descent_release_m_s: float = Field(default=0.05, ge=0, le=5)
     """Downward speed below which an arrest may end [m/s]."""
@@ -94,12 +88,4 @@ class SupervisorConfig(Section):
         ):
             if getattr(self, off) >= getattr(self, on):
                 raise ValueError(f"{off} = {getattr(self, off):g} must be below {on} = {getattr(self, on):g}")
-        for strict, lenient in (
-            ("harness_load_arrest_n", "harness_load_calm_n"),
-            ("descent_arrest_m_s", "descent_calm_m_s"),
-        ):
-            if getattr(self, strict) > getattr(self, lenient):
-                raise ValueError(
-                    f"{strict} = {getattr(self, strict):g} must be at most {lenient} = {getattr(self, lenient):g}"
-                )
         return self

@@ -52,9 +52,8 @@ class Status(NamedTuple):
 
 def advance(status: Status, evidence: Evidence, now_ns: int, config: SupervisorConfig) -> Status:
     """Return the status at `now_ns`; at most one transition a call."""
-    limits = _limits(status.state, evidence, config)
-    since = _measure(status.since, evidence, limits, now_ns, config)
-    moment = _Moment(status, evidence, limits, since, now_ns, config)
+    since = _measure(status.since, evidence, now_ns, config)
+    moment = _Moment(status, evidence, since, now_ns, config)
     transition = _RULES[status.state](moment)
     if transition is None:
         return status._replace(since=since)
@@ -68,15 +67,9 @@ class _Transition(NamedTuple):
     reason: str
 
 
-class _Limits(NamedTuple):
-    load_n: float
-    descent_m_s: float
-
-
 class _Moment(NamedTuple):
     status: Status
     evidence: Evidence
-    limits: _Limits
     since: Since
     now_ns: int
     config: SupervisorConfig
@@ -86,18 +79,7 @@ class _Moment(NamedTuple):
         return began_ns is not None and self.now_ns - began_ns >= nanoseconds(dwell_s)
 
 
-def _limits(state: GaitState, evidence: Evidence, config: SupervisorConfig) -> _Limits:
-    """Return from where on load and descent are a fall.
-
-    Who follows somebody that vision has just judged safe all along the horizon lets them sit down; a
-    horizon that is not trusted never counts as safe for long (`KnownRisk`), and nowhere else is anything let pass.
-    """
-    if state is GaitState.FOLLOW and evidence.risk_ahead < config.guard_off:
-        return _Limits(config.harness_load_calm_n, config.descent_calm_m_s)
-    return _Limits(config.harness_load_arrest_n, config.descent_arrest_m_s)
-
-
-def _measure(since: Since, evidence: Evidence, limits: _Limits, now_ns: int, config: SupervisorConfig) -> Since:
+def _measure(since: Since, evidence: Evidence, now_ns: int, config: SupervisorConfig) -> Since:
     settled = (
         evidence.risk_near < config.arrest_off
         and evidence.load_n < config.harness_load_release_n
@@ -108,8 +90,8 @@ def _measure(since: Since, evidence: Evidence, limits: _Limits, now_ns: int, con
         evidence.risk_ahead >= config.guard_on,
         evidence.risk_ahead < config.guard_off,
         evidence.risk_near >= config.arrest_on,
-        evidence.load_n >= limits.load_n,
-        evidence.descent_m_s >= limits.descent_m_s,
+        evidence.load_n >= config.harness_load_arrest_n,
+        evidence.descent_m_s >= config.descent_arrest_m_s,
         settled,
     )
     began = (before if before is not None else now_ns for before in since)
@@ -181,10 +163,10 @@ def _arrest(m: _Moment) -> _Transition | None:
     Who is started again, or gets its inputs back, while a person hangs in the harness goes on arresting.
     """
     if m.lasted(m.since.loaded, m.config.trigger_dwell_s):
-        words = f"harness load {m.evidence.load_n:.0f} N, limit {m.limits.load_n:.0f}"
+        words = f"harness load {m.evidence.load_n:.0f} N, limit {m.config.harness_load_arrest_n:.0f}"
         return _Transition(GaitState.ARREST, words)
     if m.lasted(m.since.descending, m.config.trigger_dwell_s):
-        words = f"column descends at {m.evidence.descent_m_s:.2f} m/s, limit {m.limits.descent_m_s:.2f}"
+        words = f"column descends at {m.evidence.descent_m_s:.2f} m/s, limit {m.config.descent_arrest_m_s:.2f}"
         return _Transition(GaitState.ARREST, words)
     if m.lasted(m.since.critical, m.config.arrest_dwell_s):
         return _Transition(GaitState.ARREST, m.evidence.why_near)

@@ -148,15 +148,15 @@ class TestWithoutVision:
     def test_harness_load(self) -> None:
         person = Person()
         person.run(1.0, walking)
-        decision = person.run(0.1, walking, load_n=520.0)
+        decision = person.run(0.1, walking, load_n=500.0)
         assert decision.state is GaitState.ARREST
-        assert decision.reason == "harness load 520 N, limit 500"
+        assert decision.reason == "harness load 500 N, limit 300"
         assert decision.stiffening == 1.0
 
     @pytest.mark.parametrize(
         "sight", [{"distance": 6.0}, {"quality": 0.0}, {"fall": 0.0, "transient": 0.0, "distance": 9.0}]
     )
-    @pytest.mark.parametrize("felt", [{"load_n": 520.0}, {"descent": 0.39}])
+    @pytest.mark.parametrize("felt", [{"load_n": 320.0}, {"descent": 0.31}])
     def test_whatever_is_seen(self, sight: dict[str, Any], felt: dict[str, float]) -> None:
         """Steady, nobody in view, surely stable: load and descent arrest within their dwell and one period."""
         person = Person()
@@ -164,24 +164,10 @@ class TestWithoutVision:
         person.run(SupervisorConfig().trigger_dwell_s + 0.011, lambda t: sight, **felt)
         assert person.history[-1].state is GaitState.ARREST
 
-    @pytest.mark.parametrize("felt", [{"load_n": 320.0}, {"descent": 0.31}])
-    @pytest.mark.parametrize(
-        ("sight", "let_pass"),
-        [({"distance": 6.0}, True), ({"quality": 0.0}, False), ({"distance": 1.0, "transient": 0.6}, False)],
-        ids=["steady", "nobody in view", "unsteady"],
-    )
-    def test_only_who_is_seen_to_be_steady_may_sit_down(
-        self, sight: dict[str, Any], let_pass: bool, felt: dict[str, float]
-    ) -> None:
-        person = Person()
-        person.run(1.0, lambda t: sight)
-        person.run(0.2, lambda t: sight, **felt)
-        assert (person.history[-1].state is GaitState.ARREST) != let_pass
-
     def test_descent(self) -> None:
         person = Person()
         person.run(1.0, walking)
-        assert person.run(0.1, walking, descent=0.4).reason == "column descends at 0.40 m/s, limit 0.38"
+        assert person.run(0.1, walking, descent=0.4).reason == "column descends at 0.40 m/s, limit 0.30"
 
 
 class TestRestart:

@@ -45,6 +45,4 @@ def test_defaults_quoted_for_the_supervisor_are_true() -> None:
     assert f"| `guard_on` / `guard_off` | {config.guard_on:.2f} / {config.guard_off:.2f} |" in text
     assert f"| `arrest_on` / `arrest_off` | {config.arrest_on:g} / {config.arrest_off:g} |" in text
     assert f"| `harness_load_arrest_n` | {config.harness_load_arrest_n:g} N |" in text
-    assert f"| `harness_load_calm_n` | {config.harness_load_calm_n:g} N |" in text
-    speeds = f"{config.descent_arrest_m_s:.2f} / {config.descent_calm_m_s:.2f} m/s"
-    assert f"| `descent_arrest_m_s` / `descent_calm_m_s` | {speeds} |" in text
+    assert f"| `descent_arrest_m_s` | {config.descent_arrest_m_s:.2f} m/s |" in text
