@@ -38,6 +38,7 @@ COMMANDS: Final = {
     "personalise": Command(
         "controller.personal.command:personalise", "Find the mass and damping that one person likes, by comparisons."
     ),
+    "doctor": Command("bridge.doctor.command:doctor", "Say what is wrong on this machine and how to mend it."),
     "config": Command("bridge.config.command:config", "Print a configuration file with every key and its meaning."),
     "demo": Command("simulation.trial.command:demo", "A simulated person is pushed, with help and without."),
     "rehearse": Command("bridge.launch.rehearse:rehearse", "Run it all on a recorded stumble, without physics."),

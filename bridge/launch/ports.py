@@ -24,7 +24,7 @@ def require_free(endpoints: Mapping[str, str], roles: Iterable[str]) -> None:
         if endpoint in taken:
             raise TransportError(f"{role} and {taken[endpoint]} would both listen on {endpoint}")
         taken[endpoint] = role
-        if not _is_free(endpoint):
+        if not is_free(endpoint):
             raise TransportError(
                 f"{role} cannot listen on {endpoint}: the port is in use (is another {role} running?); "
                 f"set bridge.endpoints.{role}"
@@ -42,7 +42,7 @@ def free_ports(count: int) -> list[int]:
     return ports
 
 
-def _is_free(endpoint: str) -> bool:
+def is_free(endpoint: str) -> bool:
     """Whether nobody listens on `endpoint`; what else may be wrong with it is for the role to say."""
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.rpartition(":")

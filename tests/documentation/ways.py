@@ -69,6 +69,7 @@ WAYS: dict[str, Way] = {
     r"surefoot personalise( --.*)?": Way(
         "asks at the terminal; tests/controller/test_controller_personal_command.py answers", never=True
     ),
+    r"surefoot doctor( --config .*)?": Way("looks at this machine, for some seconds", "{wire}", long=True),
     # what learns
     r"surefoot train.*cuda.*": Way("needs a GPU", never=True),
     r"torchrun .*--nnodes.*": Way("needs two machines", never=True),
