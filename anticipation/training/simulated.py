@@ -11,7 +11,7 @@ which is known, because each was tried without help:
 
 'Shows' is the first moment at which a keypoint is 5 cm from where it would have been without the disturbance: before
 that no camera can know. What comes after somebody was put back on their feet carries no label, nor what a
-person does who was meant to stay up and touched the floor.
+person does who was meant to stay up and touched the floor or hung in the harness with all their weight.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ HANGS_WEIGHTS: Final = 0.4  # of the person's weight in the harness: without it 
 UP_AGAIN_WEIGHTS: Final = 0.2
 RISES_M: Final = 0.003  # by which the pelvis must rise in a frame to count as not coming down
 SHOWN_FOR_S: Final = 1.5  # a disturbance that brings nobody down is over by then
-BEFORE_CONTACT_S: Final = 1.5  # of who was not meant to fall and did
+ALL_THEIR_WEIGHTS: Final = 1.0
+BEFORE_ACCIDENT_S: Final = 1.5  # of who was not meant to fall and did
 
 
 def read(folder: Path) -> list[Clip]:
@@ -63,7 +64,9 @@ def labels(facts: Arrays) -> Labels:
     time_s = np.arange(len(drop)) / float(facts["fps"])
     found = np.full(len(drop), STABLE, dtype=np.int64)
     if not float(facts["fall"]):
-        found[time_s > float(facts["touched_s"]) - BEFORE_CONTACT_S] = UNLABELLED
+        hangs = load >= ALL_THEIR_WEIGHTS
+        accident_s = min(float(facts["touched_s"]), time_s[int(np.argmax(hangs))] if hangs.any() else np.inf)
+        found[time_s > accident_s - BEFORE_ACCIDENT_S] = UNLABELLED
         return found
     shows_s = float(facts["visible_s"])
     held = (time_s >= float(facts["disturbed_s"])) & (load >= HANGS_WEIGHTS)

@@ -32,6 +32,10 @@ def facts(**changes: object) -> Arrays:
     return Arrays(Path("made up"), {**made, **{name: np.asarray(value) for name, value in changes.items()}})  # type: ignore[arg-type]
 
 
+def hanging_from(moment_s: float) -> np.ndarray:
+    return 1.2 * (np.arange(FRAMES) / FPS >= moment_s)
+
+
 def first(labels: np.ndarray, state: int) -> float:
     return float(np.argmax(labels == state) / FPS)
 
@@ -81,9 +85,10 @@ def test_a_seat_that_was_meant_is_no_descent() -> None:
 def test_a_survived_stumble_is_stable_and_an_accident_is_not_sold_as_that() -> None:
     stumble = simulated.labels(facts(fall=0.0, load_weights=np.zeros(FRAMES), drop_m=np.full(FRAMES, 0.03)))
     assert (stumble == STABLE).all()
-    accident = simulated.labels(facts(fall=0.0, touched_s=6.0))
-    assert set(accident[: round(4.4 * FPS)]) == {STABLE}
-    assert set(accident[round(4.6 * FPS) :]) == {UNLABELLED}
+    for changes in ({"touched_s": 6.0, "load_weights": np.zeros(FRAMES)}, {"load_weights": hanging_from(6.0)}):
+        accident = simulated.labels(facts(fall=0.0, **changes))
+        assert set(accident[: round(4.4 * FPS)]) == {STABLE}
+        assert set(accident[round(4.6 * FPS) :]) == {UNLABELLED}
 
 
 def test_a_folder_of_clips_is_read_and_a_missing_one_named(tmp_path: Path) -> None:
