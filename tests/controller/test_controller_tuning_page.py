@@ -211,6 +211,22 @@ def test_a_file_that_somebody_changed_meanwhile_is_not_overwritten(bench: Bench,
     assert file.read_text() == CONFIG.replace("0.4 ", "0.5 ")
 
 
+def test_a_changed_supervisor_is_counted_with_from_the_next_opening_on(bench: Bench, file: Path) -> None:
+    def needless() -> int:
+        scores = bench.score(bench.config.intervention, lambda _: None, lambda: False)
+        assert scores is not None
+        return scores.outcome.needless
+
+    assert needless() == 1
+    file.write_text(CONFIG.replace("arrest_on = 0.8", "arrest_on = 0.99\narrest_dwell_s = 1"))
+    bench.refresh()
+    assert needless() == 0
+    file.write_text(CONFIG.replace("arrest_on = 0.8", "arrest_on = 8"))
+    with pytest.raises(SurefootError, match="arrest_on"):
+        bench.refresh()
+    assert needless() == 0
+
+
 def test_saving_elsewhere_leaves_the_file_alone_and_goes_on_there(file: Path, tmp_path: Path) -> None:
     out = tmp_path / "tuned.toml"
     bench = Bench(recordings(), load_config(file), file, out)

@@ -104,8 +104,19 @@ class Bench:
         own = self.file is not None and self.file.resolve() == self.save_to.resolve()
         write_toml(self.file, self.save_to, changes, note=(NOTE,), force=self.force or own)
         self.file = self.save_to
-        self.config = self.read()
+        self.refresh()
         return f"saved to {self.save_to}: {', '.join(changes)}"
+
+    def refresh(self) -> None:
+        """Take the configuration as it stands in the file now; scores under another `[supervisor]` are forgotten.
+
+        Raises:
+            ConfigError: the file is gone or does not hold together; what was known stays.
+        """
+        found = self.read()
+        if found.model_copy(update={"intervention": self.config.intervention}) != self.config:
+            self._scores.clear()
+        self.config = found
 
     def read(self) -> SurefootConfig:
         """Return the configuration as it stands in the file now.

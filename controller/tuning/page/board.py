@@ -57,7 +57,7 @@ class Board:
         self._scores: Scores | None = None
         self._file_scores: Scores | None = None
         try:
-            bench.config = bench.read()
+            bench.refresh()
             self._unreadable = ""
         except SurefootError as error:
             self._unreadable = str(error)
@@ -231,16 +231,22 @@ class Board:
             self._draw_tradeoff()
 
     async def _score(self, intervention: InterventionConfig) -> Scores | None:
-        done = 0
+        done, gone = 0, False
 
         def told(count: int) -> None:
             nonlocal done
             done = count
 
-        counting = asyncio.ensure_future(asyncio.to_thread(self._bench.score, intervention, told, self._news.is_set))
-        while not (await asyncio.wait({counting}, timeout=0.2))[0]:
-            with self._client:
-                self._tiles.counting(done, len(self._bench.cases))
+        def unwanted() -> bool:
+            return gone or self._news.is_set()
+
+        counting = asyncio.ensure_future(asyncio.to_thread(self._bench.score, intervention, told, unwanted))
+        try:
+            while not (await asyncio.wait({counting}, timeout=0.2))[0]:
+                with self._client:
+                    self._tiles.counting(done, len(self._bench.cases))
+        finally:
+            gone = True  # the page is closed, or the server ends: nobody waits for the rest
         return counting.result()
 
     def _show_draft(self) -> None:
