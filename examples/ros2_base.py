@@ -17,7 +17,9 @@ Surefoot's commands, and Surefoot's processes need no ROS. Options, from `[launc
 from __future__ import annotations
 
 import math
+import threading
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from pydantic import ValidationError
@@ -38,6 +40,15 @@ WIRE = {"connect": "tcp/127.0.0.1:7447", "naming": "ros2dds", "domain": "0", "na
 OTHER = {"column_height_m": "1.0", "sensor_yaw_deg": "0"}
 
 
+class RosSide(NamedTuple):
+    """The base's own wire."""
+
+    wire: ZenohTransport
+    odometry: Inbox[Odometry]
+    wrench: Inbox[Wrench]
+    twist: Outbox
+
+
 class Ros2Base:
     """Turns gated commands into the base's velocity commands, and its sensors into what Surefoot reads."""
 
@@ -50,18 +61,18 @@ class Ros2Base:
         self._gate = SafetyGate(GateLimits(**context.config.gate.model_dump()), column_height_m=self._height_m)
         self._commands: Inbox[SupportCommand] = Inbox(context.transport, SUPPORT_COMMAND)
         self._odometry, self._wrench = Outbox(context.transport, ODOMETRY), Outbox(context.transport, WRENCH)
-        self._ros = ZenohTransport(wire, "drive", context.clock)
-        self._base_odometry: Inbox[Odometry] = Inbox(self._ros, ODOMETRY)
-        self._base_wrench: Inbox[Wrench] = Inbox(self._ros, WRENCH)
-        self._twist = Outbox(self._ros, TWIST)
+        self._ros: RosSide | None = None
         self._executed: SupportCommand | None = None
-        self._faults, self._clock = "", context.clock
+        self._faults, self._clock = f"nothing answers at {wire.connect[0]}", context.clock
+        threading.Thread(target=self._open, args=(wire,), name="ros", daemon=True).start()
 
     def step(self, now_ns: int) -> None:
         """Hand commands down and measurements up; what the base does not say anew is not said again."""
         self._executed = self._gate.filter(self._commands.read(now_ns).message, now_ns)
-        self._send(self._executed)
-        odometry, wrench = self._base_odometry.read(now_ns), self._base_wrench.read(now_ns)
+        if (ros := self._ros) is None:
+            return
+        self._send(ros, self._executed)
+        odometry, wrench = ros.odometry.read(now_ns), ros.wrench.read(now_ns)
         self._faults = "; ".join(filter(None, (odometry.fault, wrench.fault)))
         if odometry.fresh and odometry.ok and odometry.message is not None:
             o = odometry.message  # stamps stay those of the measurement
@@ -71,9 +82,14 @@ class Ros2Base:
             w = wrench.message
             self._wrench.send(replace(w, force=self._turn @ w.force, torque=self._turn @ w.torque))
 
-    def _send(self, executed: SupportCommand) -> None:
+    def _open(self, wire: BridgeConfig) -> None:
+        """Wait for the bridge or the router, which may be started later, without holding up the loop."""
+        ros = ZenohTransport(wire, "drive", self._clock)
+        self._ros = RosSide(ros, Inbox(ros, ODOMETRY), Inbox(ros, WRENCH), Outbox(ros, TWIST))
+
+    def _send(self, ros: RosSide, executed: SupportCommand) -> None:
         planar = executed.velocity * (1.0, 1.0, 1.0, 0.0)  # it has no column to move
-        self._twist.send(replace(executed, velocity=planar, frame_id="base_link"))
+        ros.twist.send(replace(executed, velocity=planar, frame_id="base_link"))
 
     def status(self, now_ns: int) -> NodeStatus:
         """Return what `surefoot up` shows: what is wrong with the base, or what it does."""
@@ -91,13 +107,15 @@ class Ros2Base:
 
     def close(self) -> None:
         """Told to stop: brake down at the gate's limits, two seconds at most, then leave the ROS side."""
+        if (ros := self._ros) is None:
+            return
         for _ in range(200):
             if self._gate.at_rest:
                 break
             now_ns = self._clock.now_ns()
-            self._send(self._gate.filter(None, now_ns))
+            self._send(ros, self._gate.filter(None, now_ns))
             self._clock.sleep_until(now_ns + nanoseconds(PERIOD_S))
-        self._ros.close()
+        ros.wire.close()
 
 
 def read_options(options: dict[str, str]) -> tuple[BridgeConfig, float, float]:

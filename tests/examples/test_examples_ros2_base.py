@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -96,9 +97,10 @@ class Base:
 class Bench:
     """The node in this process: Surefoot's wire in memory, the ROS side over Zenoh."""
 
-    def __init__(self, naming: str, **options: str) -> None:
+    def __init__(self, naming: str, *, late: bool = False, **options: str) -> None:
         port = free_ports(1)[0]
-        self.base, self.clock = Base(port, naming), SystemClock()
+        self.start_base = partial(Base, port, naming)
+        self.base, self.clock = None if late else self.start_base(), SystemClock()
         hub = MemoryHub(self.clock)
         given = {"connect": f"tcp/127.0.0.1:{port}", "naming": naming, **options}
         context = NodeContext(load_config(None), hub.transport(), self.clock, logging.getLogger("test"), given)
@@ -113,7 +115,7 @@ class Bench:
         while not condition():
             assert time.monotonic() < end_s, self.node.status(self.clock.now_ns()).summary
             now_ns = self.clock.now_ns()
-            if speak:
+            if speak and self.base is not None:
                 self.base.say(now_ns)
             if command_it:
                 self.commands.send(command(now_ns, forward, velocity=np.array([forward, 0.0, 0.0, 0.05])))
@@ -161,6 +163,16 @@ def test_a_base_that_falls_silent_is_named_and_nothing_old_is_said_again(bench: 
 def test_without_commands_the_base_is_braked(bench: Bench) -> None:
     bench.until(lambda: bench.base.heard.is_set() and bench.base.twist.twist.linear.x > 0.3)
     bench.until(lambda: abs(bench.base.twist.twist.linear.x) < 1e-6, command_it=False)
+
+
+def test_a_base_that_is_started_later_is_waited_for() -> None:
+    bench = Bench("ros2dds", late=True)
+    turns = iter(range(20))
+    bench.until(lambda: next(turns, None) is None)
+    assert "the base: nothing answers at tcp/127.0.0.1:" in bench.node.status(bench.clock.now_ns()).summary
+    bench.base = bench.start_base()
+    bench.until(lambda: bench.base.heard.is_set() and bench.odometry.read(bench.clock.now_ns()).ok)
+    bench.close()
 
 
 def test_told_to_stop_it_brakes_the_base_first() -> None:
