@@ -6,6 +6,7 @@ one begins in DISARMED, at rest, as any controller that is started. So the walke
 
 from __future__ import annotations
 
+import shutil
 import signal
 import subprocess
 import sys
@@ -23,7 +24,7 @@ class Trial:
     """At most one controller at a time; it ends with the context."""
 
     def __init__(self, log: Path) -> None:
-        self._log = log
+        self._log, self._running = log, log.with_name("running.toml")
         self._process: subprocess.Popen[bytes] | None = None
         self._builder: subprocess.Popen[bytes] | None = None
 
@@ -45,12 +46,13 @@ class Trial:
         self._builder = _started(words, subprocess.DEVNULL)
 
     def run(self, config: Path) -> None:
-        """Stop the controller that runs, and start one with `config`.
+        """Stop the controller that runs, and start one with a copy of `config`, which may be rewritten meanwhile.
 
         Raises:
             SurefootError: the one before died; the text is the last line it said.
         """
         self.stop()
+        shutil.copyfile(config, self._running)
         words = [
             sys.executable,
             "-m",
@@ -60,10 +62,15 @@ class Trial:
             "controller",
             "--no-screen",
             "--config",
-            str(config),
+            str(self._running),
         ]
         with self._log.open("wb") as log:
             self._process = _started(words, log)
+
+    @property
+    def over(self) -> bool:
+        """Whether no controller runs."""
+        return self._process is None or self._process.poll() is not None
 
     def stop(self) -> None:
         """Stop the controller, if one runs.
@@ -74,6 +81,7 @@ class Trial:
         process, self._process = self._process, None
         if process is None:
             return
+        self._running.unlink(missing_ok=True)
         died = process.poll() not in (None, 0)
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
