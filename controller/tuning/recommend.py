@@ -22,7 +22,7 @@ from controller.tuning.score import Intervening, Outcome, Tally, total
 from controller.tuning.search import Tried, search_grid, search_study
 from controller.tuning.space import Setting, Space
 
-CHECKED_S: Final = 300.0  # recording that the chosen setting is replayed on with the code that runs live
+CHECKED_S: Final = 120.0  # recording that the chosen setting is replayed on with the code that runs live
 
 Told = Callable[[str, float], None]  # what is being done, and how much more of it is, of 1
 

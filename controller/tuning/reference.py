@@ -32,9 +32,10 @@ def replay_live(
     transitions: list[Transition] = []
     before = GaitState.DISARMED
     wrenches, odometries = _pulls(case.pull), _descents(case.descent)
+    at_rest = Reading(_wrench(0, 0.0), 0.0, "", True), Reading(_odometry(0, 0.0), 0.0, "", True)
     for turn, now_ns in enumerate(case.times_ns.tolist()):
         horizon = _reading(case.horizons.stream, known.horizon, messages, turn, now_ns, supervisor.horizon_age_limit_s)
-        wrench, odometry = Reading(_wrench(now_ns, 0.0), 0.0, "", True), Reading(_odometry(now_ns, 0.0), 0.0, "", True)
+        wrench, odometry = at_rest
         if case.pull is not None and known.wrench is not None:
             wrench = _reading(
                 case.pull.stream, known.wrench, wrenches, turn, now_ns, supervisor.wrench_age_limit_s

@@ -10,7 +10,7 @@ from bridge.config.intervention import InterventionConfig
 from bridge.errors import MissingExtraError
 from controller.tuning.evaluate import Evaluator
 from controller.tuning.score import Outcome, Tally, total
-from controller.tuning.space import Setting, Space, changed, configured, rounded
+from controller.tuning.space import Setting, Space, changed, configured, ordered, rounded
 
 BATCH: Final = 10  # proposals of a study that are tried at a time: fixed, or the answer would depend on --jobs
 TRIES: Final = 20  # proposals for one that holds together, before a study gives up
@@ -109,7 +109,8 @@ def _propose(
         if len(batch) == count:
             break
         trial = study.ask()
-        values = dict(rounded({each.key: trial.suggest_float(each.key, each.low, each.high) for each in space.ranges}))
+        proposed = {each.key: trial.suggest_float(each.key, each.low, each.high) for each in space.ranges}
+        values = dict(rounded(ordered(proposed)))
         config = configured(present, values)
         if config is None:
             study.tell(trial, state=optuna.trial.TrialState.FAIL)

@@ -131,6 +131,26 @@ def changed(present: InterventionConfig, values: Mapping[str, float | int]) -> S
     return {key: value for key, value in values.items() if value != getattr(present, key)}
 
 
+ORDERED: Final = (  # a proposal that has them the wrong way round means the other way round
+    ("distance_full_sd", "distance_onset_sd"),
+    ("approach_full_s", "approach_onset_s"),
+    ("approach_near_sd", "approach_far_sd"),
+    ("credible_onset", "credible_full"),
+    ("probability_onset", "probability_full"),
+    ("release_per_s", "rise_per_s"),
+    ("rise_per_s", "arrest_per_s"),
+)
+
+
+def ordered(values: Mapping[str, float]) -> dict[str, float]:
+    """Return `values` with each pair of thresholds that has an order in that order."""
+    put = dict(values)
+    for low, high in ORDERED:
+        if low in put and high in put and put[low] > put[high]:
+            put[low], put[high] = put[high], put[low]
+    return put
+
+
 def rounded(values: Mapping[str, float]) -> Iterator[tuple[str, float | int]]:
     """Give keys and values with as many digits as a threshold deserves."""
     for key, value in values.items():
