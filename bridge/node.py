@@ -19,6 +19,7 @@ from bridge.clock import Clock, SystemClock
 from bridge.config.load import load_config
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import ConfigError, SurefootError
+from bridge.exit_codes import ExitCode
 from bridge.loop import run_loop
 from bridge.messages import NodeStatus
 from bridge.outbox import Outbox
@@ -75,15 +76,18 @@ Priority = Callable[[SurefootConfig], int]  # SCHED_FIFO priority that the confi
 
 
 class _StopFlag:
-    """Set by SIGINT and SIGTERM."""
+    """Set by SIGINT and SIGTERM; while there is nothing to finish yet, they end the process at once."""
 
     def __init__(self) -> None:
         self.set = False
+        self.working = False
         signal.signal(signal.SIGINT, self._raise)
         signal.signal(signal.SIGTERM, self._raise)
 
     def _raise(self, _number: int, _frame: object) -> None:
         self.set = True
+        if not self.working:  # a client may be waiting for its router
+            raise SystemExit(ExitCode.DONE)
 
 
 def main(role: str, factory: Factory, arguments: Sequence[str] | None = None, priority: Priority = lambda _: 0) -> int:
@@ -101,6 +105,7 @@ def main(role: str, factory: Factory, arguments: Sequence[str] | None = None, pr
         with ExitStack() as stack:
             wire_log = stack.enter_context(WireLog(log)) if config.bridge.keys else None
             transport = stack.enter_context(closing(ZenohTransport(config.bridge, role, clock)))
+            stop.working = True
             if wire_log is not None:
                 stack.callback(wire_log.watch, None)  # nobody looks at a session that is closed
                 wire_log.watch(transport.session)

@@ -55,7 +55,8 @@ def record(
     wanted = parse_topics(topics) if topics is not None else TOPICS
     path = out or _default_name()
     require_free(path, overwrite=force)
-    with StopSignals() as stop, closing(ZenohTransport(loaded.bridge, "recorder", SystemClock())) as wire:
+    # signals are ours from when there is something to finish
+    with closing(ZenohTransport(loaded.bridge, "recorder", SystemClock())) as wire, StopSignals() as stop:
         recorder = Recorder(wire, wanted, BagWriter(path, loaded.bridge.namespace, wanted, overwrite=force))
         note(f"recording {len(wanted)} topics to {path}; Ctrl-C ends it")
         started_s = time.monotonic()

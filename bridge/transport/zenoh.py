@@ -8,7 +8,7 @@ import logging
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import zenoh
 
@@ -16,13 +16,16 @@ from bridge.clock import Clock
 from bridge.config.bridge import BridgeConfig, is_authenticated
 from bridge.errors import TransportError
 from bridge.keys.check import Credentials, load_credentials
-from bridge.keys.identity import ROUTER, identity_of
+from bridge.keys.identity import OBSERVER, ROUTER, identity_of
 from bridge.topics import Topic
 from bridge.transport.attachment import IDENTIFIER_BYTES, pack, unpack
 from bridge.transport.interface import Sample
 from bridge.transport.names import names_of, type_hash
 from bridge.transport.rmw_zenoh import OFFERED_QOS, Endpoint, identifier
 from bridge.transport.session import zenoh_settings
+from bridge.transport.waiting import open_waiting
+
+ROUTER_WAIT_S: Final = 30.0  # who only looks does not wait for ever
 
 _LOG = logging.getLogger("bridge.transport")
 
@@ -55,7 +58,8 @@ class ZenohTransport:
     """`Transport` over a Zenoh session of its own.
 
     Raises:
-        TransportError: the endpoint of `role` is taken or malformed, or wants certificates where there are none.
+        TransportError: the endpoint of `role` is taken or malformed, or wants certificates where there are none; or it
+            is a client who only looks, and no router answers.
         KeysError: the certificates of `role` cannot be used.
 
     Attributes:
@@ -145,6 +149,9 @@ def open_session(config: BridgeConfig, role: str) -> Any:
     for path, value in settings.items():
         zenoh_config.insert_json5(path, json.dumps(value))
     try:
+        if settings["mode"] == "client":
+            limit_s = ROUTER_WAIT_S if identity_of(role) == OBSERVER else None
+            return open_waiting(lambda: zenoh.open(zenoh_config), role, config.connect, limit_s)
         return zenoh.open(zenoh_config)
     except zenoh.ZError as error:
         endpoint = ", ".join(settings["listen/endpoints"]) or "none"
