@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from bridge.config.intervention import InterventionConfig
-from bridge.config.load import parse_config
+from bridge.config.load import parse_config, read_text
+from bridge.config.version import migrated_text
 from bridge.errors import ConfigError, MissingExtraError, SurefootError
 
 SECTION: Final = "intervention"
@@ -75,10 +76,8 @@ def tuned_text(source: Path | None, changes: Mapping[str, float | int], note: Se
 
     name = "defaults" if source is None else str(source)
     try:
-        document: Any = tomlkit.parse("" if source is None else source.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise ConfigError(f"{name}: no such configuration file") from error
-    except (OSError, UnicodeDecodeError, TOMLKitError) as error:
+        document: Any = tomlkit.parse(migrated_text("" if source is None else read_text(source), name)[0])
+    except TOMLKitError as error:
         raise ConfigError(f"{name}: cannot be read: {error}") from error
     parse_config(document.unwrap(), name)  # what is wrong already is not our doing
     if SECTION not in document:

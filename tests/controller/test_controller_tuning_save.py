@@ -9,6 +9,7 @@ import pytest
 
 from bridge.config.load import load_config
 from bridge.config.template import render_template
+from bridge.config.version import VERSION, migrated_text
 from bridge.errors import ConfigError, SurefootError
 from controller.tuning.save import tuned_text, write_toml
 
@@ -58,7 +59,7 @@ def test_tuned_again_it_says_what_was_before_and_no_more(tmp_path: Path) -> None
 def test_values_that_are_as_they_were_are_left_alone(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text(MINE)
-    assert tuned_text(file, {"distance_onset_sd": 1.5, "release_per_s": 1.0}) == MINE
+    assert tuned_text(file, {"distance_onset_sd": 1.5, "release_per_s": 1.0}) == migrated_text(MINE, "mine")[0]
 
 
 @pytest.mark.parametrize(
@@ -71,7 +72,7 @@ def test_any_way_of_writing_the_section(tmp_path: Path, text: str) -> None:
     before, tuned = tomllib.loads(text), tomllib.loads(tuned_text(file, {"distance_onset_sd": 2.0}))
     assert tuned["intervention"]["distance_onset_sd"] == 2.0
     before.setdefault("intervention", {})["distance_onset_sd"] = 2.0
-    assert tuned == before
+    assert tuned == {**before, "version": VERSION}
 
 
 def test_the_whole_template(tmp_path: Path) -> None:
@@ -84,7 +85,8 @@ def test_the_whole_template(tmp_path: Path) -> None:
 
 
 def test_without_a_file_there_is_the_section_alone() -> None:
-    assert tomllib.loads(tuned_text(None, {"distance_onset_sd": 2.0})) == {"intervention": {"distance_onset_sd": 2.0}}
+    expected = {"version": VERSION, "intervention": {"distance_onset_sd": 2.0}}
+    assert tomllib.loads(tuned_text(None, {"distance_onset_sd": 2.0})) == expected
 
 
 def test_nothing_is_overwritten_unasked(tmp_path: Path) -> None:
