@@ -39,8 +39,8 @@ class SupervisorConfig(Section):
     arrest_hold_s: float = Field(default=1.0, ge=0, le=30)
     """How long risk, load and descent must all be low before ARREST ends [s]."""
 
-    harness_load_arrest_n: float = Field(default=300.0, gt=0, le=5000)
-    """Downward pull at the interface that is a fall, whatever vision says [N]; leaning stays below about 200 N."""
+    harness_load_arrest_n: float = Field(default=370.0, gt=0, le=5000)
+    """Downward pull at the interface that is a fall, whatever vision says [N]; half the weight of 75 kg."""
 
     harness_load_release_n: float = Field(default=150.0, ge=0, le=5000)
     """Downward pull below which an arrest may end [N]."""

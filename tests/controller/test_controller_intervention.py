@@ -150,13 +150,13 @@ class TestWithoutVision:
         person.run(1.0, walking)
         decision = person.run(0.1, walking, load_n=500.0)
         assert decision.state is GaitState.ARREST
-        assert decision.reason == "harness load 500 N, limit 300"
+        assert decision.reason == "harness load 500 N, limit 370"
         assert decision.stiffening == 1.0
 
     @pytest.mark.parametrize(
         "sight", [{"distance": 6.0}, {"quality": 0.0}, {"fall": 0.0, "transient": 0.0, "distance": 9.0}]
     )
-    @pytest.mark.parametrize("felt", [{"load_n": 320.0}, {"descent": 0.31}])
+    @pytest.mark.parametrize("felt", [{"load_n": 380.0}, {"descent": 0.31}])
     def test_whatever_is_seen(self, sight: dict[str, Any], felt: dict[str, float]) -> None:
         """Steady, nobody in view, surely stable: load and descent arrest within their dwell and one period."""
         person = Person()

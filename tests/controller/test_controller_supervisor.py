@@ -241,7 +241,7 @@ class TestReasons:
             (FOLLOW, "input lost", "wrench is 70 ms old, limit 60"),
             (FOLLOW, "risk ahead", "ahead words"),
             (FOLLOW, "fall near", "near words"),
-            (GUARD, "harness load", "harness load 400 N, limit 300"),
+            (GUARD, "harness load", "harness load 400 N, limit 370"),
             (GUARD, "descent", "column descends at 0.40 m/s, limit 0.30"),
             (GUARD, "calm", "risk below 0.1 for 500 ms"),
             (ARREST, "calm", "risk, load and descent low for 1000 ms"),
