@@ -11,7 +11,7 @@ from typing import Final
 
 from bridge.doctor.finding import Finding, Level, Patient
 from bridge.keys.check import load_credentials
-from bridge.keys.files import AUTHORITY, KeysError, certificate_file
+from bridge.keys.files import AUTHORITY, KeysError, certificate_file, key_file
 from bridge.keys.identity import OBSERVER, ROUTER
 
 CERTIFICATES: Final = "certificates"
@@ -65,5 +65,6 @@ def _mend(text: str, folder: Path, role: str) -> str:
         return "a new authority: see docs/security.md, 'When certificates end'"
     if "clock" in text:
         return "sudo timedatectl set-ntp true"
-    renew = "" if "no such file" in text else " --renew"
+    # with one of the two files left, issuing anew would rightly refuse to replace it
+    renew = " --renew" if certificate_file(folder, role).exists() or key_file(folder, role).exists() else ""
     return f"surefoot keys issue {role}{renew} --keys {quoted}"

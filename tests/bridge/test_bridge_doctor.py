@@ -232,7 +232,18 @@ class TestCertificates:
     def test_a_role_without(self, folder: Path) -> None:
         (folder / "controller.pem").unlink()
         found = only(judge_certificates(folder, self.ROLES, self.NOW), Level.BROKEN)
-        assert found.mend == f"surefoot keys issue controller --keys {folder}"
+        assert found.mend == f"surefoot keys issue controller --renew --keys {folder}"
+
+    def test_the_commands_do_mend_it(self, tmp_path: Path) -> None:
+        folder = tmp_path / "keys"
+        for spoil in (lambda: None, (folder / "controller.pem").unlink, (folder / "perception.key").unlink):
+            spoil()
+            for finding in judge_certificates(folder, self.ROLES, datetime.now(UTC)):
+                if finding.level is Level.BROKEN:
+                    for command in finding.mend.split(" && "):
+                        assert main(command.split()[1:]) == 0
+            levels = {finding.level for finding in judge_certificates(folder, self.ROLES, datetime.now(UTC))}
+            assert levels == {Level.GOOD}
 
     def test_a_key_that_others_may_read(self, folder: Path) -> None:
         (folder / "controller.key").chmod(0o644)
