@@ -71,11 +71,17 @@ def visit(tmp_path: Path) -> Callable[[Callable[[Person], Awaitable[None]]], Non
 
     def run(does: Callable[[Person], Awaitable[None]]) -> None:
         async def visiting() -> None:
+            failed: Exception | None = None
             async with testing.user_simulation(root=lambda: Board(bench) and None) as user:
                 await user.open("/")
                 person = Person(user, file)
-                await person.counted()
-                await does(person)
+                try:
+                    await person.counted()
+                    await does(person)
+                except (AssertionError, TimeoutError) as error:  # thrown through the simulation it would never end
+                    failed = error
+            if failed is not None:
+                raise failed
 
         asyncio.run(visiting())
 
