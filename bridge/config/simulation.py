@@ -24,6 +24,12 @@ class SimulationConfig(Section):
     walking_speed_m_s: float = Field(default=0.6, ge=0.0, le=1.2)
     """Speed the person wants [m/s]."""
 
+    clip: str = ""
+    """Motion capture, FILE.npz:NAME, that drives the person until the disturbance or its end; none if empty."""
+
+    clip_from_s: float = Field(default=0.0, ge=0, le=3600)
+    """Where in the clip to begin [s]."""
+
     begins: Literal["at_once", "armed"] = "at_once"
     """Whether the scenario begins with the process, or once the walker follows; the person stands until then."""
 

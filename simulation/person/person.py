@@ -20,6 +20,7 @@ from simulation.person.ability import FRAIL, Ability
 from simulation.person.anthropometry import BodySize
 from simulation.person.body import SIDES
 from simulation.person.leg import leg_angles
+from simulation.person.posture import HIP_SHARE, turn_error
 from simulation.person.reflexes import Reflexes
 from simulation.person.stepping import DOUBLE_SUPPORT_S, Bob, bob, dip, foothold, plan_step
 from simulation.person.support import Sole, Stance, double_support, ground_force, single_support, wanted_pressure
@@ -72,13 +73,13 @@ class Person:
         self._trunk_kd = np.array([g.trunk_nms_rad, g.trunk_nms_rad, g.turn_nms_rad])
         self._turn_limit = g.turn_moment_nm * size.mass_kg / 70.0
         self.pelvis, self.torso = model.body("pelvis").id, model.body("torso").id
-        self._leg = {side: Leg(model, data, side, sign, size, g, CONTROL_S) for side, sign in SIDES}
-        self._upper = UpperBody(model, data, size, g)
-        self._motors = np.concatenate((*(leg.motor for leg in self._leg.values()), self._upper.motor))
-        self._dofs = np.concatenate((*(leg.dof for leg in self._leg.values()), self._upper.dof))
+        self.legs = {side: Leg(model, data, side, sign, size, g, CONTROL_S) for side, sign in SIDES}
+        self.upper = UpperBody(model, data, size, g)
+        self._motors = np.concatenate((*(leg.motor for leg in self.legs.values()), self.upper.motor))
+        self._dofs = np.concatenate((*(leg.dof for leg in self.legs.values()), self.upper.dof))
         self._torque = np.abs(model.actuator_ctrlrange[:, 1])
-        self.foot = {side: leg.foot for side, leg in self._leg.items()}
-        self.sole = {s: model.geom(f"{s}_sole").id for s, _ in SIDES}
+        self.foot = {side: leg.foot for side, leg in self.legs.items()}
+        self.sole = {s: leg.geom for s, leg in self.legs.items()}
         self._jacobian, self._spin = np.zeros((3, model.nv)), np.zeros((3, model.nv))
         self._velocity = np.zeros(6)
         self._moment_limit = ability.trunk_moment_nm * size.mass_kg / 70.0
@@ -132,17 +133,17 @@ class Person:
             self.fallen = True
         effort = 0.0 if self.fallen else intent.effort
         if effort <= 0.0:
-            self._limp()
+            data.ctrl[self._motors] = np.clip(-LIMP_KD * data.qvel[self._dofs], -5.0, 5.0)  # a little tone
             return
         self._follow(intent)
         dcm = (float(com[0] + com_velocity[0] / self._omega), float(com[1] + com_velocity[1] / self._omega))
         heading = (cos(self.heading_rad), sin(self.heading_rad))
-        lead, trail = self._sole_of(self.stance), self._sole_of(self.swing)
+        lead, trail = self.legs[self.stance].sole(), self.legs[self.swing].sole()
         self._decide(dcm, lead, trail, intent, heading)
-        lead, trail = self._sole_of(self.stance), self._sole_of(self.swing)
+        lead, trail = self.legs[self.stance].sole(), self.legs[self.swing].sole()
         torque = np.zeros(model.nu)
         stance, in_air = self._stance(dcm, lead, trail, heading)
-        moment = self._trunk_moment(heading)
+        moment = self._trunk_moment()
         if in_air:
             reaction = self._swing_leg(torque, dcm, stance.centre, lead, heading)
             moment += self._reaction * reaction
@@ -157,14 +158,40 @@ class Person:
         force = ground_force(com, max(float(com[2]), 0.3), stance.centre, vertical, (moment[0], moment[1]))
         sides = (self.stance,) if in_air else (self.stance, self.swing)
         for side, share, point in zip(sides, stance.share, stance.pressure, strict=True):
-            self._push(torque, side, share * force, point, share * moment[2])
+            self.push(torque, side, share * force, point, share * moment[2])
         feet = data.xpos[self.foot["l"]] - data.xpos[self.foot["r"]]
         apart = heading[0] * float(feet[0]) + heading[1] * float(feet[1])
-        torque[self._upper.motor] = self._upper.torque(self._pitch, intent.reach_rad, apart, self._speed)
-        limit = self._torque * (self.ability.strength * effort)
-        np.clip(torque, -limit, limit, out=torque)
-        data.ctrl[self._motors] = torque[self._motors]
+        torque[self.upper.motor] = self.upper.torque(self._pitch, intent.reach_rad, apart, self._speed)
+        self.exert(torque, effort)
         self._time_in_step += CONTROL_S
+
+    def exert(self, torque: Floats, effort: float = 1.0) -> None:
+        """Set the motors to `torque` (n_motors,) [N m], within `effort` of the person's strength."""
+        limit = self._torque * (self.ability.strength * effort)
+        self._data.ctrl[self._motors] = np.clip(torque, -limit, limit)[self._motors]
+
+    def resume(self, pitch_rad: float) -> None:
+        """Go on by oneself, standing or in the middle of a step, from where body and feet are now.
+
+        Args:
+            pitch_rad: forward bend of the trunk.
+        """
+        data, feet = self._data, {side: leg.on_floor() for side, leg in self.legs.items()}
+        mujoco.mj_subtreeVel(self._model, data)
+        com, velocity, m = data.subtree_com[self.pelvis], data.subtree_linvel[self.pelvis], data.xmat[self.pelvis]
+        self.heading_rad, self._pitch, self.fallen = atan2(m[3], m[0]), pitch_rad, False
+        c, s = cos(self.heading_rad), sin(self.heading_rad)
+        self._speed = min(max(c * float(velocity[0]) + s * float(velocity[1]), 0.0), FASTEST_M_S)
+        ahead = {
+            side: c * float(data.xpos[foot][0]) + s * float(data.xpos[foot][1]) for side, foot in self.foot.items()
+        }
+        leading = "l" if ahead["l"] > ahead["r"] else "r"
+        both = feet["l"] == feet["r"]
+        self._standing = both and self._speed < 0.1
+        self._begin(leading if both else "l" if feet["l"] else "r", standing=self._standing)
+        if not both:
+            passed = (c * float(com[0]) + s * float(com[1]) - ahead[self.stance]) / max(self._step.length_m, 0.2)
+            self._time_in_step = self._lifts_s + min(max(0.5 + passed, 0.0), 0.8) * (self._lands_s - self._lifts_s)
 
     # --- what to do -------------------------------------------------------------------------------------------------
 
@@ -191,7 +218,7 @@ class Person:
         planned = self._lands_s
         if self._time_in_step < self._lifts_s + 0.5 * (planned - self._lifts_s):
             return
-        landed = self._on_floor(self.swing)
+        landed = self.legs[self.swing].on_floor()
         if not ((landed and self._time_in_step > LANDED * planned) or self._time_in_step > planned + 0.15):
             return
         self.steps += 1
@@ -222,7 +249,7 @@ class Person:
             self._lifts_s = self._time_in_step
             self._lands_s = min(self._step.duration_s, self._lifts_s + self.ability.shortest_step_s)
         else:
-            least = (1.0 - self._leg[self.swing].swung) * g.hurry * self.ability.shortest_step_s
+            least = (1.0 - self.legs[self.swing].swung) * g.hurry * self.ability.shortest_step_s
             soonest = self._time_in_step + max(least, FELT_TO_SWING_S)
             self._lands_s = min(self._lands_s, soonest)
 
@@ -236,8 +263,8 @@ class Person:
         short = self._speed - way / self._time_in_step
         self._urge = min(max(self._urge + URGE_GAIN * short, -URGE_MOST_M_S), URGE_MOST_M_S) if self._speed > 0 else 0.0
 
-    def _begin(self, stance: str) -> None:
-        self._standing = False
+    def _begin(self, stance: str, standing: bool = False) -> None:
+        self._standing = standing
         self.stance, self._time_in_step, self._lifted = stance, 0.0, False
         com = self._data.subtree_com[self.pelvis]
         self._began_at, self._sagged = (float(com[0]), float(com[1])), 0.0
@@ -317,7 +344,7 @@ class Person:
         dx = px + (dcm[0] - px) * growth - lead.x
         dy = py + (dcm[1] - py) * growth - lead.y
         target = foothold((c * dx + s * dy - bx, c * dy - s * dx - by), sign, self.size.height_m, self.ability)
-        leg = self._leg[side]
+        leg = self.legs[side]
         if not self._lifted:
             self._lifted, self._foothold = True, target
             leg.lift()
@@ -332,65 +359,37 @@ class Person:
         torque[leg.motor] = move + self._data.qfrc_bias[leg.dof]
         return leg.turns_pelvis(move)
 
-    def _trunk_moment(self, heading: tuple[float, float]) -> Floats:
+    def _trunk_moment(self) -> Floats:
         """Return the moment (3,) that turns the pelvis to its wanted posture [N m]."""
         mujoco.mj_objectVelocity(self._model, self._data, mujoco.mjtObj.mjOBJ_BODY, self.pelvis, self._velocity, 0)
-        m = self._data.xmat[self.pelvis]
-        c, s = heading
-        lean = 0.6 * self._pitch  # the rest is in the back
-        cl, sl = cos(lean), sin(lean)
-        # columns of the wanted orientation: Rz(heading) Ry(lean)
-        x, y, z = (c * cl, s * cl, -sl), (-s, c, 0.0), (c * sl, s * sl, cl)
-        fx, fy, fz = m[0::3], m[1::3], m[2::3]
-        error = 0.5 * np.array([
-            fx[1] * x[2] - fx[2] * x[1] + fy[1] * y[2] - fy[2] * y[1] + fz[1] * z[2] - fz[2] * z[1],
-            fx[2] * x[0] - fx[0] * x[2] + fy[2] * y[0] - fy[0] * y[2] + fz[2] * z[0] - fz[0] * z[2],
-            fx[0] * x[1] - fx[1] * x[0] + fy[0] * y[1] - fy[1] * y[0] + fz[0] * z[1] - fz[1] * z[0],
-        ])  # fmt: skip
+        lean = HIP_SHARE * self._pitch  # the rest is in the back
+        error = turn_error(self._data.xmat[self.pelvis], self.heading_rad, lean)
         moment = self._trunk_kp * error - self._trunk_kd * self._velocity[:3]
         moment *= self.size.strength
         limit = np.array([self._moment_limit, self._moment_limit, self._turn_limit])
         np.clip(moment, -limit, limit, out=moment)
         return moment
 
-    def _push(self, torque: Floats, side: str, force: Floats, point: tuple[float, float], turn: float) -> None:
-        """Add the torques with which the leg of `side` pushes `force` through `point` of the floor."""
+    def push(
+        self, torque: Floats, side: str, force: Floats, point: tuple[float, float] | None = None, turn: float = 0.0
+    ) -> None:
+        """Set in `torque` how the leg of `side` pushes `force` through `point` of the floor, or its sole's middle."""
+        point = self.legs[side].sole()[:2] if point is None else point
         ankle = self._data.xpos[self.foot[side]]
-        dof = self._leg[side].dof
+        dof = self.legs[side].dof
         mujoco.mj_jac(self._model, self._data, self._jacobian, self._spin, ankle, self.foot[side])
         rx, ry, rz = point[0] - ankle[0], point[1] - ankle[1], -self.size.ankle_height_m
         fx, fy, fz = force
         moment = np.array([ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx + turn])
-        torque[self._leg[side].motor] = -(self._jacobian[:, dof].T @ force + self._spin[:, dof].T @ moment)
-
-    def _limp(self) -> None:
-        """Leave the joints to gravity, with a little tone."""
-        data = self._data
-        data.ctrl[self._motors] = np.clip(-LIMP_KD * data.qvel[self._dofs], -5.0, 5.0)
-
-    # --- where things are -------------------------------------------------------------------------------------------
-
-    def _sole_of(self, side: str) -> Sole:
-        position, m = self._data.xpos[self.foot[side]], self._data.xmat[self.foot[side]]
-        turn = atan2(m[3], m[0])
-        forward = self.size.sole_forward_m
-        return Sole(
-            float(position[0] + cos(turn) * forward), float(position[1] + sin(turn) * forward),
-            0.42 * self.size.foot_m, 0.87 * self.size.sole_half_width_m,
-        )  # fmt: skip
-
-    def _on_floor(self, side: str) -> bool:
-        contact = self._data.contact
-        sole = self.sole[side]
-        return bool(np.any(contact.geom1 == sole) or np.any(contact.geom2 == sole))
+        torque[self.legs[side].motor] = -(self._jacobian[:, dof].T @ force + self._spin[:, dof].T @ moment)
 
     def _stand_up(self) -> None:
         data, size = self._data, self.size
         root = self._model.joint("root").qposadr[0]
         down = self._reflexes.knees_bent * size.leg_m
-        for leg in self._leg.values():
+        for leg in self.legs.values():
             ankle = leg.hip + np.array([-0.3 * size.sole_forward_m, 0.0, -down])
             data.qpos[leg.q] = leg_angles(ankle, np.eye(3), leg.hip, size.thigh_m, size.shank_m)
         data.qpos[root + 2] = down + size.ankle_height_m + 0.001
-        data.qpos[self._upper.q] = UpperBody.REST
+        data.qpos[self.upper.q] = UpperBody.REST
         mujoco.mj_forward(self._model, data)

@@ -6,7 +6,7 @@ torque that the wanted acceleration takes (M q'' of the model), so that the leg 
 
 from __future__ import annotations
 
-from math import pi, sin
+from math import atan2, cos, pi, sin
 from typing import Any, Final
 
 import mujoco
@@ -17,6 +17,7 @@ from simulation.person.anthropometry import BodySize
 from simulation.person.body import LEG_JOINTS
 from simulation.person.leg import leg_angles
 from simulation.person.reflexes import Reflexes
+from simulation.person.support import Sole
 
 FASTEST_RAD_S: Final = 15.0
 FASTER_RAD_S2: Final = 150.0
@@ -33,6 +34,7 @@ class Leg:
     Attributes:
         dof, q, motor: indices of its six joints' velocities, positions and motors, (6,).
         foot: the foot's body.
+        geom: the sole's geometry.
         hip: the hip joint in the pelvis frame, (3,) [m].
         swung: share of the present swing that is over, 0..1.
     """
@@ -47,6 +49,7 @@ class Leg:
         self.q = np.array([model.joint(name).qposadr[0] for name in joints])
         self.motor = np.array([model.actuator(name).id for name in joints])
         self.foot = model.body(f"{side}_foot").id
+        self.geom = model.geom(f"{side}_sole").id
         self.hip: Floats = np.array([0.0, sign * size.hip_half_width_m, 0.0])
         self._pelvis = model.body("pelvis").id
         self._hip_joint = np.array([model.joint(name).id for name in joints[:3]])
@@ -58,6 +61,20 @@ class Leg:
         self._angles: Floats | None = None
         self._rate, self._acceleration = np.zeros(6), np.zeros(6)
         self.swung = 0.0
+
+    def sole(self) -> Sole:
+        """Return where the sole presses on the floor."""
+        position, m = self._data.xpos[self.foot], self._data.xmat[self.foot]
+        turn, forward = atan2(m[3], m[0]), self._size.sole_forward_m
+        return Sole(
+            float(position[0] + cos(turn) * forward), float(position[1] + sin(turn) * forward),
+            0.42 * self._size.foot_m, 0.87 * self._size.sole_half_width_m,
+        )  # fmt: skip
+
+    def on_floor(self) -> bool:
+        """Whether the sole touches anything."""
+        contact = self._data.contact
+        return bool(np.any(contact.geom1 == self.geom) or np.any(contact.geom2 == self.geom))
 
     def lift(self) -> None:
         """Begin a swing."""

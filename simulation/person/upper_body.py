@@ -9,6 +9,7 @@ import numpy as np
 from bridge.messages import Floats
 from simulation.person.anthropometry import BodySize
 from simulation.person.body import UPPER_JOINTS
+from simulation.person.posture import HIP_SHARE
 from simulation.person.reflexes import Reflexes
 
 
@@ -37,7 +38,7 @@ class UpperBody:
         """
         swing = self._swing_rad * min(abs(speed_m_s), 1.0) * min(max(apart_m / 0.5, -1.0), 1.0)
         wanted = self.REST.copy()
-        wanted[0] = 0.4 * pitch_rad
+        wanted[0] = (1.0 - HIP_SHARE) * pitch_rad
         wanted[3] += swing - reach_rad
         wanted[4] -= swing + reach_rad
         data = self._data

@@ -6,6 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from simulation.mocap.clip import Clip
+from simulation.mocap.follow import Follower
+from simulation.mocap.retarget import retarget
 from simulation.person.ability import FRAIL, Ability
 from simulation.person.anthropometry import BodySize
 from simulation.person.person import Intent
@@ -55,6 +58,7 @@ class Scenario:
     seed: int = 0
     faults: SensorFaults = HEALTHY
     checks: tuple[str, ...] = ()  # names of checks that must hold, see simulation.campaign.checks
+    clip: Clip | None = None  # what the person does until the first disturbance, from the end of the waiting on
     lowered_m: float = 0.0  # how far the person means to come down: a fall's drop counts from there
 
 
@@ -65,6 +69,8 @@ class Performance:
         """Set the scene; without the harness (`worn` False) nobody helps."""
         self.scenario = scenario
         self.world = World(scenario.size, scenario.ability, seat=scenario.seat, worn=worn)
+        self._track = None if scenario.clip is None else retarget(scenario.clip, scenario.size)
+        self.follower: Follower | None = None  # who drives the person along the clip
         self.waiting = False  # while True the person stands and nothing begins
         self._begin_s = 0.0
         self.watchers: list[Callable[[World], None]] = []  # called after every turn
@@ -101,6 +107,10 @@ class Performance:
                 began = self._began_s[index] = now
             if began is not None:
                 intent = each.act(self.world, intent, now - began)
+        if self._track is not None and self.follower is None:
+            until_s = min((each.at_s for each in self.scenario.disturbances), default=self._track.duration_s)
+            self.follower = Follower(self.world, self._track, until_s)
+            self.world.drive = self.follower.act
         self.world.advance(command, intent)
         for watcher in self.watchers:
             watcher(self.world)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from bridge.config.simulation import SimulationConfig
+from simulation.mocap.clip import load_clip
 from simulation.person.anthropometry import BodySize
 from simulation.person.person import Intent
 from simulation.scenarios.disturbance import Disturbance, Faint, Push, Slip, Trip
@@ -15,7 +16,11 @@ AFTER_EVENT_S: Final = 6.0
 
 
 def scenario_from(config: SimulationConfig) -> Scenario:
-    """Return the scenario of `[simulation]`."""
+    """Return the scenario of `[simulation]`.
+
+    Raises:
+        SourceError: the motion-capture clip cannot be used.
+    """
     happens: dict[str, tuple[Disturbance, ...]] = {
         "walk": (),
         "push": (Push(config.event_s, config.push_impulse_n_s, config.push_direction_deg),),
@@ -32,4 +37,5 @@ def scenario_from(config: SimulationConfig) -> Scenario:
         disturbances=happens[config.scenario],
         duration_s=config.event_s + AFTER_EVENT_S,
         seed=config.seed,
+        clip=load_clip(config.clip, config.clip_from_s, config.event_s) if config.clip else None,
     )

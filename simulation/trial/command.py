@@ -56,6 +56,9 @@ def demo(
         Path, typer.Option("--out", metavar="FOLDER", help="Where film, pictures and recordings go.")
     ] = Path("runs/demo"),
     film: Annotated[bool, typer.Option(help="Render demo.gif and demo.png.")] = True,
+    clip: Annotated[
+        str, typer.Option(metavar="FILE.npz:NAME", help="Motion capture that drives the person until the push.")
+    ] = "",
     config: ConfigOption = None,
     set_: SetOption = None,
     json: JsonOption = None,
@@ -70,7 +73,8 @@ def demo(
     if json is not None:
         require_writable(json)
     console = note_console()
-    overrides = [*(set_ or []), *private_wire(config, set_ or [], ROLES, "demo"), *WORLD]
+    chosen = [f"simulation.clip={clip}"] if clip else []
+    overrides = [*(set_ or []), *chosen, *private_wire(config, set_ or [], ROLES, "demo"), *WORLD]
     settings = load_config(config, overrides).simulation
     console.print(
         f"[bold]surefoot demo[/]  {settings.person_height_m:.2f} m, {settings.person_mass_kg:.0f} kg, walking at"

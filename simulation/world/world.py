@@ -103,6 +103,7 @@ class World:
         self.data.qpos[self.model.joint("column").qposadr[0]] = interface_height_m
         self.person = Person(self.model, self.data, size, ability)
         self.walker = WalkerPlant(self.model, self.data, parameters, STEP_S)
+        self.drive = self.person.act  # what sets the person's torques
         self.wrench = HarnessWrench(0.0, 0.0, 0.0, 0.0)
         self._harness = HarnessParameters() if harness is None else harness
         self._worn = worn
@@ -121,7 +122,7 @@ class World:
         """Move on by CONTROL_S with `command` (forward, left, yaw, column velocity) and the person wanting `intent`."""
         data = self.data
         wanted = np.asarray(command, dtype=np.float64)
-        self.person.act(intent)
+        self.drive(intent)
         for _ in range(STEPS_A_TURN):
             data.xfrc_applied[:] = 0.0
             self.walker.apply(wanted)

@@ -1,0 +1,1 @@
+"""Motion capture that drives the person until something happens to them."""
