@@ -66,6 +66,8 @@ WAYS: dict[str, Way] = {
     r"surefoot tune .*--serve.*": Way(
         "serves a page until it is stopped", "--port 0", long=True, stops_s=30, says="open http://127.0.0.1:"
     ),
+    r"surefoot tune runs/campaign .*": Way("replays a campaign that was performed before it", long=True),
+    r"surefoot tune .*--method study.*": Way("a smaller study", "--trials 4"),
     r"surefoot personalise( --.*)?": Way(
         "asks at the terminal; tests/controller/test_controller_personal_command.py answers", never=True
     ),
