@@ -25,6 +25,7 @@ PROFILE: Final = "ros2"
 SCHEMA_ENCODING: Final = "ros2msg"
 MESSAGE_ENCODING: Final = "cdr"
 SOURCE_KEY: Final = "surefoot_publisher"  # channel metadata: publisher's identifier, hexadecimal
+HASH_KEY: Final = "topic_type_hash"  # channel metadata: of the type's fields (REP 2016)
 ABOUT: Final = "surefoot"  # name of the metadata record that says what was listened to
 LIBRARY: Final = f"surefoot {version('surefoot')}"
 METADATA_FILE: Final = "metadata.yaml"
@@ -79,8 +80,13 @@ def schema_text(ros_type: str) -> str:
 
 def channel_metadata(topic: Topic, source: bytes) -> dict[str, str]:
     """Return what the channel of one publisher says about itself."""
-    known = {"offered_qos_profiles": _QOS, "topic_type_hash": TYPES.hash_rihs01(topic.ros_type)}
+    known = {"offered_qos_profiles": _QOS, HASH_KEY: TYPES.hash_rihs01(topic.ros_type)}
     return {**known, SOURCE_KEY: source.hex()} if source else known
+
+
+def has_present_definition(topic: Topic, metadata: Mapping[str, str]) -> bool:
+    """Whether messages of a channel are laid out as this version has them; one that does not say is believed."""
+    return metadata.get(HASH_KEY, "") in {"", TYPES.hash_rihs01(topic.ros_type)}
 
 
 def source_of(metadata: Mapping[str, str]) -> bytes:

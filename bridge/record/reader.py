@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 import struct
+from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import closing
 from itertools import islice
@@ -19,7 +20,14 @@ from zstandard import ZstdError
 from bridge.codec import decode
 from bridge.errors import InvalidMessage, SourceError
 from bridge.messages import Message
-from bridge.record.layout import ABOUT, MESSAGE_ENCODING, SUFFIX, source_of, split_channel_topic
+from bridge.record.layout import (
+    ABOUT,
+    MESSAGE_ENCODING,
+    SUFFIX,
+    has_present_definition,
+    source_of,
+    split_channel_topic,
+)
 from bridge.topics import TOPICS, TWIST, Topic
 from bridge.transport.interface import Sample
 
@@ -105,6 +113,7 @@ class Recording:
     def _in_file_order(self, keys: Collection[str]) -> Iterator[Recorded]:
         self.damage, self._read, self.foreign, self.namespace = "", 0, {}, ""
         damages: list[str] = []
+        others: Counter[tuple[str, str]] = Counter()
         for file in self.files:
             before = self._read
             scan = _Scan(file)
@@ -115,7 +124,9 @@ class Recording:
                         channels[record.id] = self._channel(record, scan.schemas.get(record.schema_id, ""))
                     elif isinstance(record, Record) and record.channel_id in channels:
                         channel = channels[record.channel_id]
-                        if channel.topic is None:
+                        if channel.other:
+                            others[channel.name] += 1
+                        elif channel.topic is None:
                             self.foreign[channel.name] = self.foreign.get(channel.name, 0) + 1
                         elif channel.topic.key in keys:
                             self._read = before + scan.position
@@ -124,23 +135,29 @@ class Recording:
                             yield Recorded(channel.topic, sample, record.publish_time)
                 damages += [f"{file.name} {damage}" if len(self.files) > 1 else damage for damage in scan.damages()]
             self._read = before + file.stat().st_size
+        damages += [
+            f"{count} messages of {name} were left out, whose {ros_type} is not the one of this version"
+            for (name, ros_type), count in others.items()
+        ]
         self.damage = "; ".join(damages)
 
     def _channel(self, record: Channel, ros_type: str) -> _Channel:
         found = split_channel_topic(record.topic, ros_type) if record.message_encoding == MESSAGE_ENCODING else None
         if found is None:
-            return _Channel((record.topic, ros_type), None, b"")
+            return _Channel((record.topic, ros_type), None, b"", other=False)
         namespace, topic = found
         if self.namespace and namespace != self.namespace:
             raise SourceError(f"{self.path}: holds topics of two robots, {self.namespace} and {namespace}")
         self.namespace = namespace
-        return _Channel((record.topic, ros_type), topic, source_of(record.metadata))
+        other = not has_present_definition(topic, record.metadata)
+        return _Channel((record.topic, ros_type), topic, source_of(record.metadata), other)
 
 
 class _Channel(NamedTuple):
     name: tuple[str, str]  # topic, type
     topic: Topic | None  # None: not one of ours
     source: bytes
+    other: bool  # one of ours, whose messages are laid out as another version has them
 
 
 class _Scan:

@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridge.cli import main
-from bridge.latency.hops import HOPS, Heard, first_on_each_frame, frame_to_command, hops, shares, spread
+from bridge.errors import SurefootError
+from bridge.latency.hops import HOPS, Heard, first_on_each_frame, frame_to_command, hops, measured, shares, spread
 from bridge.messages import FallHorizon, GaitState, Keypoints, SupportCommand
 
 MS = 1_000_000
@@ -87,6 +88,19 @@ def test_a_frame_whose_horizon_was_missed_has_no_hops() -> None:
 def test_nothing_heard_is_not_a_number() -> None:
     assert math.isnan(spread([]).p99)
     assert math.isnan(hops(Heard([], [], []))["anticipation"].p50)
+
+
+def test_nothing_measured_is_an_error_with_its_reason() -> None:
+    """Neither a table of NaN nor JSON with them."""
+    everything = heard([(1, 1, 1, 1, 1), (2, 2, 2, 2, 2)])
+    assert measured(everything) == (frame_to_command(everything), hops(everything))
+    with pytest.raises(SurefootError, match="0 keypoints, 0 horizons and 0 commands came, 0 of these rest on a frame"):
+        measured(Heard([], [], []))
+    stopped = [(command(START + k, 0), START + k) for k in range(5)]
+    with pytest.raises(SurefootError, match="and 5 commands came, 0 of these rest on a frame"):
+        measured(everything._replace(commands=stopped))
+    with pytest.raises(SurefootError, match="of 2 frames that became commands the observer missed every one's"):
+        measured(everything._replace(horizons=[]))
 
 
 @pytest.mark.processes

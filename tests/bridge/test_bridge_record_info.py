@@ -11,6 +11,7 @@ from bridge_recordings import NAMESPACE, SOURCES, START_NS, Event, keypoints, wa
 from bridge.cli import main
 from bridge.clock import NS
 from bridge.codec import encode
+from bridge.record import layout
 from bridge.record.info import RecordingInfo, summarise
 from bridge.record.reader import Recording
 from bridge.record.writer import BagWriter
@@ -83,6 +84,29 @@ def test_a_file_that_was_cut_off_is_read_and_said(truncated: Path, capsys: pytes
     found = json.loads(capsys.readouterr().out)
     assert found["whole"] is False
     assert 1.4 < found["duration_s"] < 1.6
+
+
+def test_messages_that_another_version_laid_out_otherwise_are_left_out_and_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Their bytes would be read as other fields than they are."""
+    true = layout.TYPES.hash_rihs01
+    old = "RIHS01_" + "0" * 64
+    with monkeypatch.context() as before:
+        before.setattr(layout.TYPES, "hash_rihs01", lambda name: old if name == KEYPOINTS.ros_type else true(name))
+        path = write(tmp_path / "old.mcap", walk(0.5))
+    recording = Recording(path)
+    found = summarise(recording)
+    assert found.damage == (
+        f"15 messages of /surefoot/keypoints were left out, whose {KEYPOINTS.ros_type} is not the one of this version;"
+        f" 15 messages of /surefoot/detections were left out, whose {KEYPOINTS.ros_type} is not the one of this version"
+    )
+    counts = {topic.topic: topic.messages for topic in found.topics}
+    assert counts["/surefoot/keypoints"] == 0
+    assert counts["/surefoot/odom"] == 50
+    assert KEYPOINTS not in {topic for topic, _, _ in recording.messages()}
+    assert main(["info", str(path)]) == 0
+    assert "15 messages of /surefoot/keypoints were left out" in capsys.readouterr().out
 
 
 def test_json_has_no_nan(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
