@@ -124,7 +124,7 @@ def _small(plan: Plan, rate: float) -> Plan:
 QUICK: Final = {name: _small(plan, 3e-3) for name, plan in FULL.items()}
 
 
-WITH_SIMULATED: Final = 4.0  # times the draws: the simulated falls fill most of a batch, and are many
+WITH_SIMULATED: Final = 3.0  # times the draws: the simulated falls fill most of a batch, and are many
 
 
 def plan_for(recipe: str, seed: int, quick: bool, epochs: int | None = None) -> Plan:
