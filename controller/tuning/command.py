@@ -18,7 +18,7 @@ from controller.tuning.cases import Case
 from controller.tuning.choose import parse_budget
 from controller.tuning.load import load_cases
 from controller.tuning.page.bench import Bench, Candidate
-from controller.tuning.page.serve import DEFAULT_PORT, require_library
+from controller.tuning.page.serve import DEFAULT_PORT, require_library, require_port
 from controller.tuning.page.serve import serve as serve_page
 from controller.tuning.recommend import Answer, Question, recommend
 from controller.tuning.save import require_tomlkit, write_toml
@@ -107,6 +107,7 @@ def tune(
     """
     if serve:
         require_library()
+        require_port(port)
     loaded = load_config(config, set_ or [])
     chosen = method or (None if serve else Method.GRID)
     question = None if chosen is None else Question(

@@ -14,6 +14,7 @@ from urllib.parse import urlsplit
 import pytest
 from controller_tuning_page_browser import WAIT_S, Served
 
+from bridge.cli import main
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import MissingExtraError, SurefootError
 from controller.tuning.page import serve
@@ -73,7 +74,7 @@ def test_it_listens_on_this_machine_alone() -> None:
         assert listening.getsockname()[0] == "127.0.0.1"
 
 
-def test_a_port_in_use_is_said_with_its_number() -> None:
+def test_a_port_in_use_is_said_with_its_number_before_a_recording_is_read(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
         other.listen()
@@ -81,7 +82,9 @@ def test_a_port_in_use_is_said_with_its_number() -> None:
         with pytest.raises(
             SurefootError, match=rf"--port {port}: cannot be opened on 127.0.0.1: Address already in use"
         ):
-            serve.listen(port)
+            serve.require_port(port)
+        assert main(["tune", "nothing.npz", "--serve", "--port", str(port)]) == 2
+        assert f"--port {port}: cannot be opened" in capsys.readouterr().err
 
 
 def test_without_recordings_or_library_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,6 +28,11 @@ def require_library() -> None:
         raise MissingExtraError("surefoot tune --serve", "nicegui", "tune")
 
 
+def require_port(port: int) -> None:
+    """Raise `SurefootError` where the page could not be opened at `port`: before any work is done for it."""
+    listen(port).close()
+
+
 def serve(bench: Bench, port: int = DEFAULT_PORT) -> int:
     """Serve the page of `bench` on loopback until SIGINT or SIGTERM; say its address on stderr.
 
