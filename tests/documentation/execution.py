@@ -28,7 +28,7 @@ from bridge.launch.ports import free_ports
 MAKEFILE = (REPO / "Makefile").read_text(encoding="utf-8")
 STAMPS = re.findall(r"^\$\(VENV\)/(\.\w+):", MAKEFILE, re.MULTILINE)
 ROLES = ("perception", "anticipation", "controller", "drive")
-PATIENCE_S = 300
+PATIENCE_S = 900
 
 
 def places() -> dict[str, str]:

@@ -40,7 +40,6 @@ WAYS: dict[str, Way] = {
         data=True,
         says=AT_WORK,
     ),
-    r"surefoot up .*--estimator yolo.*": Way("needs a network that nobody may hand on", never=True),
     r"surefoot (up|router) --config (camera|walker)\.toml.*": Way(
         "two machines; tests/bridge/test_bridge_several_machines.py runs both files", never=True
     ),
