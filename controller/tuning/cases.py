@@ -109,20 +109,33 @@ class Case:
         return times_s
 
 
+class HorizonColumns:
+    """Gathers horizons one by one, and nothing of them that no threshold looks at."""
+
+    def __init__(self, key: str) -> None:
+        self._key = key
+        self._rows: list[tuple[int, int, str, float, float]] = []
+        self._arrays: list[tuple[Floats, Floats, Floats]] = []
+
+    def add(self, message: FallHorizon, arrival_ns: int, fault: str) -> None:
+        """Take the next horizon."""
+        self._rows.append((arrival_ns, message.stamp_ns, fault, message.quality, message.step_s))
+        self._arrays.append((message.probabilities, message.distance, message.distance_rate))
+
+    def horizons(self) -> Horizons:
+        """Return what was gathered."""
+        count = len(self._rows)
+        arrival_ns, stamp_ns, faults, quality, step_s = zip(*self._rows, strict=True) if count else ((),) * 5
+        return Horizons(
+            stream(self._key, arrival_ns, stamp_ns, faults),
+            np.array([arrays[0] for arrays in self._arrays]).reshape(count, STEPS, 3),
+            np.array([arrays[1] for arrays in self._arrays]).reshape(count, STEPS),
+            np.array([arrays[2] for arrays in self._arrays]).reshape(count, STEPS),
+            np.array(quality, dtype=np.float64),
+            np.array(step_s, dtype=np.float64),
+        )
+
+
 def stream(key: str, arrival_ns: Sequence[int], stamp_ns: Sequence[int], faults: Sequence[str]) -> Stream:
     """Return a stream of plain sequences."""
     return Stream(key, np.array(arrival_ns, np.int64), np.array(stamp_ns, np.int64), tuple(faults))
-
-
-def horizons(messages: Sequence[FallHorizon], arrival_ns: Sequence[int], faults: Sequence[str], key: str) -> Horizons:
-    """Return messages as arrays."""
-    of = stream(key, arrival_ns, [message.stamp_ns for message in messages], faults)
-    count = len(messages)
-    return Horizons(
-        of,
-        np.array([message.probabilities for message in messages]).reshape(count, STEPS, 3),
-        np.array([message.distance for message in messages]).reshape(count, STEPS),
-        np.array([message.distance_rate for message in messages]).reshape(count, STEPS),
-        np.array([message.quality for message in messages]),
-        np.array([message.step_s for message in messages]),
-    )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 
@@ -14,8 +14,9 @@ from bridge.clock import NS, nanoseconds
 from bridge.config.surefoot import SurefootConfig
 from bridge.errors import SourceError
 from bridge.lockstep import LockStep
+from bridge.messages import FallHorizon
 from bridge.topics import FALL_HORIZON
-from controller.tuning.cases import Case, Horizons, Ints, horizons
+from controller.tuning.cases import Case, HorizonColumns, Horizons, Ints
 from controller.tuning.falls import labelled_falls
 from controller.tuning.judging import Judge
 
@@ -98,20 +99,19 @@ def foresee(job: ClipJob, stamps_ns: Sequence[int], config: SurefootConfig) -> H
         },
         START_NS,
     )
-    samples: list[Any] = []
+    judge, columns = Judge(FALL_HORIZON, config.inputs.stuck_after_s), HorizonColumns(FALL_HORIZON.key)
+
+    def take(sample: Any) -> None:
+        if (one := judge.judge(sample)) is not None:
+            columns.add(cast(FallHorizon, one.message), one.arrival_ns, one.fault)
+
     try:
-        system.hub.transport().subscribe(FALL_HORIZON, samples.append)
+        system.hub.transport().subscribe(FALL_HORIZON, take)
         for offset_ns in stamps_ns:
             system.advance_to(START_NS + offset_ns)
     finally:
         system.close()
-    judged = Judge(FALL_HORIZON, config.inputs.stuck_after_s).judge(samples)
-    return horizons(
-        [one.message for one in judged],  # type: ignore[misc]
-        [one.arrival_ns for one in judged],
-        [one.fault for one in judged],
-        FALL_HORIZON.key,
-    )
+    return columns.horizons()
 
 
 def _base(name: str, names: Sequence[str]) -> str:

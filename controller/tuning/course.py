@@ -19,7 +19,7 @@ from controller.intervention.risk import ramp, time_to_boundary
 from controller.tuning.cases import Case, Horizons, Ints
 from controller.tuning.watching import Watched, held, values, watch
 
-BLOCK: Final = 1 << 16  # turns at a time: hours of recording must not need gigabytes
+BLOCK: Final = 1 << 15  # turns at a time: hours of recording must not need gigabytes
 
 
 class Stages(NamedTuple):

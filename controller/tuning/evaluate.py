@@ -10,7 +10,7 @@ import joblib
 from bridge.config.intervention import InterventionConfig
 from bridge.config.supervisor import SupervisorConfig
 from controller.tuning.cases import Case
-from controller.tuning.course import Stages
+from controller.tuning.course import Stages, inputs
 from controller.tuning.replay import replay
 from controller.tuning.score import Intervening, Tally, score_one
 
@@ -85,4 +85,9 @@ def _count(
     stages: Stages,
     by: Intervening,
 ) -> list[list[Tally]]:
-    return [[score_one(replay(case, config, supervisor, stages), by) for case in cases] for config in configs]
+    rows: list[list[Tally]] = [[] for _ in configs]
+    for case in cases:
+        known = inputs(case, supervisor)
+        for row, config in zip(rows, configs, strict=True):
+            row.append(score_one(replay(case, config, supervisor, stages, known), by))
+    return rows

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from bridge.clock import NS
@@ -35,20 +34,9 @@ class Judge:
         self._stuck = StuckWatch(topic.key, stuck_after_s)
         self._source: bytes | None = None
         self._sequence, self._stamp_ns, self._heard_ns = -1, 0, 0
-        self.left_out = 0
 
-    def judge(self, samples: Iterable[Any]) -> list[Judged]:
-        """Return what is left of `samples` (`bridge.transport.interface.Sample`)."""
-        taken: list[Judged] = []
-        for sample in samples:
-            judged = self._one(sample)
-            if judged is None:
-                self.left_out += 1
-            else:
-                taken.append(judged)
-        return taken
-
-    def _one(self, sample: Any) -> Judged | None:
+    def judge(self, sample: Any) -> Judged | None:
+        """Return what an inbox says of the next `bridge.transport.interface.Sample`; None if it says nothing."""
         other = self._source is not None and sample.source != self._source
         if other and sample.arrival_ns - self._heard_ns <= self._topic.max_age_s * NS:
             return None

@@ -75,7 +75,10 @@ def _panel(axes: Any, answer: Answer, value: Callable[[Outcome], float], spread:
     )  # fmt: skip
     front = [judged.outcome for judged in answer.front]
     axes.plot(*points(front), "o", color=TRANSIENT, markersize=6.5, label="none better", zorder=3)
-    axes.plot(*points([answer.present.outcome]), "D", color=INK, markersize=9, label="present values", zorder=4)
+    axes.plot(
+        *points([answer.present.outcome]), "D", markerfacecolor="none", markeredgecolor=INK, markersize=15,
+        markeredgewidth=1.6, label="present values", zorder=4,
+    )  # fmt: skip
     best = answer.recommended.outcome
     axes.plot(*points([best]), "*", color=FALL, markersize=17, markeredgecolor="white", label="recommended", zorder=5)
     if answer.held_out is None:
@@ -85,6 +88,6 @@ def _panel(axes: Any, answer: Answer, value: Callable[[Outcome], float], spread:
         axes.plot(x * 2, spread, color=FALL, linewidth=1.0, alpha=0.6, zorder=1.5)
         axes.plot((answer.needless.low, answer.needless.high), y * 2, color=FALL, linewidth=1.0, alpha=0.6, zorder=1.5)
     axes.plot(
-        x, y, "*", markerfacecolor="white", markeredgecolor=FALL, markersize=15, markeredgewidth=1.4,
+        x, y, "*", markerfacecolor="white", markeredgecolor=FALL, markersize=12, markeredgewidth=1.3,
         label="chosen without, judged on (95 %)", zorder=5,
     )  # fmt: skip

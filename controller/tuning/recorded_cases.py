@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple, cast
@@ -17,9 +17,9 @@ from bridge.record.layout import SUFFIX
 from bridge.record.offline import replay_offline
 from bridge.record.reader import Recording
 from bridge.topics import FALL_HORIZON, KEYPOINTS, ODOMETRY, WRENCH, Topic
-from controller.tuning.cases import Case, Felt, horizons, stream
+from controller.tuning.cases import Case, Felt, HorizonColumns, stream
 from controller.tuning.falls import checked, read_falls
-from controller.tuning.judging import Judge, Judged
+from controller.tuning.judging import Judge
 
 SIDECAR: Final = ".falls.csv"  # beside a recording: 'walk.falls.csv' for 'walk.mcap'
 LONGEST_S: Final = 48 * 3600.0  # of one recording; a longer one has stamps of two clocks in it
@@ -43,63 +43,80 @@ def recording_case(job: RecordingJob, config: SurefootConfig) -> Case:
         SourceError: no recording, or nothing in it that horizons could come from.
     """
     recording = Recording(job.path)
-    wanted = (FALL_HORIZON, WRENCH, ODOMETRY, KEYPOINTS)
-    samples: dict[str, list[Any]] = {topic.key: [] for topic in wanted}
-    first_ns = last_ns = 0
+    stuck_s = config.inputs.stuck_after_s
+    seen, wrench, odometry = _Horizons(stuck_s), _Felt(WRENCH, stuck_s, _pull_n), _Felt(ODOMETRY, stuck_s, _descent_m_s)
+    takers = {FALL_HORIZON.key: seen.take, WRENCH.key: wrench.take, ODOMETRY.key: odometry.take}
+    if job.recompute:
+        del takers[FALL_HORIZON.key]
+    keypoints, first_ns, last_ns = 0, 0, 0
     for recorded in recording.samples():
         first_ns, last_ns = first_ns or recorded.log_time_ns, recorded.log_time_ns
-        if recorded.topic.key in samples:
-            samples[recorded.topic.key].append(recorded.sample)
-    seen = samples[FALL_HORIZON.key]
-    if job.recompute or not seen:
-        seen = _foreseen(recording, samples, config)
+        keypoints += recorded.topic.key == KEYPOINTS.key
+        if recorded.topic.key in takers:
+            takers[recorded.topic.key](recorded.sample)
     if last_ns - first_ns > LONGEST_S * NS:
         raise SourceError(f"{job.path}: lasts {(last_ns - first_ns) / NS / 3600:.0f} h, limit {LONGEST_S / 3600:.0f}")
+    if not seen.count:
+        if not keypoints:
+            raise SourceError(f"{job.path}: holds neither horizons nor keypoints")
+        replay_offline(recording, ["anticipation"], config, {}, seen.keep)
     period_ns = nanoseconds(1.0 / config.controller.rate_hz)
-    horizon = _judged(FALL_HORIZON, seen, config)
-    wrench, odometry = (_judged(topic, samples[topic.key], config) for topic in (WRENCH, ODOMETRY))
     case = Case(
         job.name,
         job.name,
         first_ns,
         period_ns,
         (last_ns - first_ns) // period_ns + 1,
-        horizons(
-            [cast(FallHorizon, one.message) for one in horizon], [one.arrival_ns for one in horizon],
-            [one.fault for one in horizon], FALL_HORIZON.key,
-        ),
-        _felt(WRENCH, wrench, [-float(cast(Wrench, one.message).force[2]) for one in wrench]),
-        _felt(ODOMETRY, odometry, [-float(cast(Odometry, one.message).velocity[2]) for one in odometry]),
-    )  # fmt: skip
+        seen.columns.horizons(),
+        wrench.felt(),
+        odometry.felt(),
+    )
     return _with_falls(case, job.path)
 
 
-def _foreseen(recording: Recording, samples: dict[str, list[Any]], config: SurefootConfig) -> list[Any]:
-    """Return samples of the horizons that the recorded keypoints give."""
-    if not samples[KEYPOINTS.key]:
-        raise SourceError(f"{recording.path}: holds neither horizons nor keypoints")
-    kept: list[Any] = []
+class _Horizons:
+    """Takes horizons as they come, recorded or computed."""
 
-    def keep(topic: Topic, sample: Any) -> None:
+    def __init__(self, stuck_after_s: float) -> None:
+        self.columns = HorizonColumns(FALL_HORIZON.key)
+        self.count = 0
+        self._judge = Judge(FALL_HORIZON, stuck_after_s)
+
+    def take(self, sample: Any) -> None:
+        if (one := self._judge.judge(sample)) is not None:
+            self.columns.add(cast(FallHorizon, one.message), one.arrival_ns, one.fault)
+            self.count += 1
+
+    def keep(self, topic: Topic, sample: Any) -> None:
         if topic.key == FALL_HORIZON.key:
-            kept.append(sample)
-
-    replay_offline(recording, ["anticipation"], config, {}, keep)
-    return kept
+            self.take(sample)
 
 
-def _judged(topic: Topic, samples: Sequence[Any], config: SurefootConfig) -> list[Judged]:
-    return Judge(topic, config.inputs.stuck_after_s).judge(samples)
+class _Felt:
+    """Takes one number of each wrench or odometry."""
+
+    def __init__(self, topic: Topic, stuck_after_s: float, value: Callable[[Any], float]) -> None:
+        self._topic, self._judge, self._value = topic, Judge(topic, stuck_after_s), value
+        self._rows: list[tuple[int, int, str, float]] = []
+
+    def take(self, sample: Any) -> None:
+        if (one := self._judge.judge(sample)) is not None:
+            self._rows.append((one.arrival_ns, one.message.stamp_ns, one.fault, self._value(one.message)))
+
+    def felt(self) -> Felt | None:
+        """Return what was felt; None for nothing."""
+        if not self._rows:
+            return None
+        arrival_ns, stamp_ns, faults, value = zip(*self._rows, strict=True)
+        return Felt(stream(self._topic.key, arrival_ns, stamp_ns, faults), np.array(value))
 
 
-def _felt(topic: Topic, judged: Sequence[Judged], value: Sequence[float]) -> Felt | None:
-    if not judged:
-        return None
-    of = stream(
-        topic.key, [one.arrival_ns for one in judged], [one.message.stamp_ns for one in judged],
-        [one.fault for one in judged],
-    )  # fmt: skip
-    return Felt(of, np.array(value))
+def _pull_n(wrench: Wrench) -> float:
+    return -float(wrench.force[2])
+
+
+def _descent_m_s(odometry: Odometry) -> float:
+    return -float(odometry.velocity[2])
 
 
 def _with_falls(case: Case, path: Path) -> Case:

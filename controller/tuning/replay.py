@@ -25,7 +25,7 @@ from controller.intervention.intervention import RELAXED
 from controller.intervention.known_risk import KnownRisk
 from controller.intervention.supervisor import Evidence, Status, advance
 from controller.tuning.cases import Case
-from controller.tuning.course import Course, Curves, Inputs, Stages, course, curves, inputs
+from controller.tuning.course import BLOCK, Course, Curves, Inputs, Stages, course, curves, inputs
 
 STATES: Final = tuple(GaitState)
 DISARMED, FOLLOW, GUARD, ARREST, RECOVER, SAFE_STOP = range(len(STATES))  # as they stand in `GaitState`
@@ -61,7 +61,11 @@ class Run:
 
 
 def replay(
-    case: Case, intervention: InterventionConfig, supervisor: SupervisorConfig, stages: Stages | None = None
+    case: Case,
+    intervention: InterventionConfig,
+    supervisor: SupervisorConfig,
+    stages: Stages | None = None,
+    known: Inputs | None = None,
 ) -> Run:
     """Return what the intervention would have done in `case`.
 
@@ -70,9 +74,10 @@ def replay(
         intervention: the thresholds.
         supervisor: hysteresis, dwell and limits of age.
         stages: of the prediction; None: as `[mpc]` has them by default.
+        known: `inputs(case, supervisor)`, if they are at hand: they are the same for all thresholds.
     """
     stages = Stages() if stages is None else stages
-    known = inputs(case, supervisor)
+    known = inputs(case, supervisor) if known is None else known
     which = curves(case, known, intervention)
     return _Machine(case, intervention, supervisor, stages, known, which).run()
 
@@ -99,25 +104,25 @@ class _Machine:
         case, supervisor = self._case, self._supervisor
         state_of, stiffening_of = np.zeros(case.ticks, np.int8), np.zeros(case.ticks)
         transitions: list[Transition] = []
-        nows, nears, aheads, wanteds = (column.tolist() for column in self._course)
-        faulty, loads, descents = (
-            self._known.faulty.tolist(), self._load_n.tolist(), self._descent_m_s.tolist(),
-        )  # fmt: skip
+        columns = (*self._course, self._known.faulty, self._load_n, self._descent_m_s)
+        first = last = 0  # turns that are at hand as plain numbers
         status, relaxed, s, period_s = Status(), True, 0.0, case.period_ns / NS
         now_ns, turn = case.start_ns, 0
         number = {state: index for index, state in enumerate(STATES)}
         while turn < case.ticks:
-            fault = _FAULT if faulty[turn] else ""
-            evidence = Evidence(
-                fault, nears[turn], aheads[turn], _NEAR, _AHEAD, loads[turn], descents[turn], relaxed
-            )  # fmt: skip
+            if turn >= last:
+                first, last = turn, turn + BLOCK
+                rows = list(zip(*(column[first:last].tolist() for column in columns), strict=True))
+            now, near, ahead, wanted, faulty, load_n, descent_m_s = rows[turn - first]
+            fault = _FAULT if faulty else ""
+            evidence = Evidence(fault, near, ahead, _NEAR, _AHEAD, load_n, descent_m_s, relaxed)
             before = status.state
             status = advance(status, evidence, now_ns, supervisor)
             if status.state is not before:
                 reason = self._words(status.reason, turn, now_ns)
                 transitions.append(Transition(turn * case.period_ns / NS, before, status.state, reason))
             s, relaxed = self._stiffen(
-                status.state, s, period_s if turn else 0.0, nows[turn], wanteds[turn], loads[turn], fault != ""
+                status.state, s, period_s if turn else 0.0, now, wanted, load_n, faulty
             )  # fmt: skip
             state_of[turn], stiffening_of[turn] = number[status.state], s
             after = max(self._next_event(status.state, s, turn), turn + 1)
@@ -130,10 +135,10 @@ class _Machine:
     def _next_event(self, state: GaitState, s: float, turn: int) -> int:
         """Return the first turn after this one at which state or stiffening may change; until then nothing can."""
         if state is GaitState.FOLLOW:
-            return self._noticed[turn] if s == 0.0 else 0
+            return int(self._noticed[turn]) if s == 0.0 else 0
         if state is GaitState.ARREST:
-            return self._stirred[turn] if s == 1.0 else 0
-        usable = self._usable[turn]
+            return int(self._stirred[turn]) if s == 1.0 else 0
+        usable = int(self._usable[turn])
         if state is GaitState.DISARMED:
             return usable if s == 0.0 else 0
         if state is GaitState.SAFE_STOP and s >= self._config.unknown_risk:
@@ -212,7 +217,7 @@ class _Machine:
         return known.horizon.fault(case.horizons.stream, turn, now_ns, limits.horizon_age_limit_s)
 
 
-def _next(happens: NDArray[np.bool_]) -> list[int]:
+def _next(happens: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return for each turn the first one from it on where something `happens`; their number where nothing does."""
     places = np.where(happens, np.arange(len(happens)), len(happens))
-    return np.minimum.accumulate(places[::-1])[::-1].tolist()  # type: ignore[no-any-return]
+    return np.minimum.accumulate(places[::-1])[::-1]
