@@ -123,20 +123,27 @@ def test_words_that_bash_broke_are_whole_again(words: list[str], position: int, 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="there is no Bash here")
 def test_bash_itself(tmp_path: Path) -> None:
-    """The script that --show-completion prints, run by Bash as it does when Tab is pressed."""
+    """The script that is printed and installed, run by Bash as it does when Tab is pressed."""
     (tmp_path / "surefoot").write_text(f'#!/bin/sh\nexec "{sys.executable}" -m bridge.cli "$@"\n')
     (tmp_path / "surefoot").chmod(0o755)
     script = """
-    source <(surefoot --show-completion bash)
-    complete -p surefoot | grep -q _surefoot_completion || exit 3
+    surefoot --install-completion bash > installed && surefoot --show-completion bash > shown || exit 3
+    source ~/.bashrc
+    complete -p surefoot | grep -q _surefoot_completion || exit 4
+    grep -q '_surefoot_completion()' shown || exit 5
     COMP_WORDS=(surefoot up --set bridge.naming = rm); COMP_CWORD=5
     _surefoot_completion surefoot
     printf '%s\\n' "${COMPREPLY[@]}"
     """
     path = f"{tmp_path}{os.pathsep}{os.environ['PATH']}"
-    environment = {**os.environ, "PATH": path, "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
+    environment = {
+        **os.environ,
+        "PATH": path,
+        "HOME": str(tmp_path),
+        "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1",
+    }
     done = subprocess.run(
         ["bash", "--norc", "--noprofile", "-c", script],
-        env=environment, capture_output=True, text=True, timeout=60, check=False,
+        env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False,
     )  # fmt: skip
     assert (done.returncode, done.stdout, done.stderr) == (0, "rmw_zenoh\n", "")
