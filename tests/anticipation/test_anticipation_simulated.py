@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from anticipation_people import falling
 
+from anticipation.checkpoint import SHIPPED, load
+from anticipation.shipped import weights
 from anticipation.training import simulated
 from anticipation.training.clips import FALL, STABLE, TRANSIENT, UNLABELLED, Arrays
 from anticipation.training.corpus import SIMULATED_CALM, SIMULATED_EVENT, SIMULATED_MOTION, Corpus, shares
@@ -126,3 +128,10 @@ def test_falls_to_come_and_quiet_moments_are_learnt_each_with_its_share(tmp_path
     assert np.isin(eventful.labels, [TRANSIENT, FALL]).any(axis=1).all()
     assert np.isin(quiet.labels, [STABLE, UNLABELLED]).all()
     assert set(eventful.track) == {0}
+
+
+def test_shipped_weights_have_names_and_say_what_they_learnt_from(tmp_path: Path) -> None:
+    assert weights("") == weights("default") == SHIPPED
+    assert weights(str(tmp_path / "mine.safetensors")) == tmp_path / "mine.safetensors"
+    assert simulated.SOURCE in load(weights("simulated")).provenance.data
+    assert simulated.SOURCE not in load(weights("")).provenance.data
