@@ -227,6 +227,50 @@ def test_what_ros2_publishes_is_received(wired: Wired) -> None:
     publisher.undeclare()
 
 
+def open_with(**settings: Any) -> Any:
+    config = zenoh.Config()
+    for path, value in {"scouting/multicast/enabled": False, **settings}.items():
+        config.insert_json5(path, json.dumps(value))
+    return zenoh.open(config)
+
+
+@pytest.fixture
+def behind_their_router() -> Iterator[tuple[str, Any]]:
+    """rmw_zenohd and a ROS 2 node as they come: the node a peer, gossip on, and no brokering between peers."""
+    endpoint = f"tcp/127.0.0.1:{free_ports(1)[0]}"
+    router = open_with(
+        **{"mode": "router", "listen/endpoints": [endpoint], "routing/router/peers_failover_brokering": False}
+    )
+    node = open_with(**{"mode": "peer", "connect/endpoints": [endpoint], "listen/endpoints": ["tcp/127.0.0.1:0"]})
+    yield endpoint, node
+    node.close()
+    router.close()
+
+
+def test_as_clients_of_their_router_both_sides_hear_each_other(behind_their_router: tuple[str, Any]) -> None:
+    """As docs/wire.md says; a process in peer mode would hear nothing behind that router."""
+    endpoint, node = behind_their_router
+    config = BridgeConfig(naming="rmw_zenoh", domain=0, mode="client", connect=(endpoint,))
+    clock, names = SystemClock(), RmwZenohNames("surefoot", 0)
+    with closing(ZenohTransport(config, "controller", clock)) as transport:
+        inbox, outbox = Inbox[Wrench](transport, WRENCH), Outbox(transport, SUPPORT_COMMAND)
+        heard = threading.Event()
+        subscriber = node.declare_subscriber(
+            names.key(SUPPORT_COMMAND), zenoh.handlers.Callback(lambda _: heard.set(), indirect=False)
+        )
+        publisher = node.declare_publisher(names.key(WRENCH))
+
+        def both() -> bool:
+            now_ns = clock.now_ns()
+            sent = Wrench(stamp_ns=now_ns, force=[1, 2, 3], torque=[0, 0, 4])
+            publisher.put(encode(WRENCH, sent), attachment=pack(now_ns, now_ns, bytes(16)))
+            outbox.send(command(now_ns))
+            return inbox.read(clock.now_ns()).ok and heard.is_set()
+
+        wait_until(both, "a wrench comes in and a command goes out")
+        subscriber.undeclare()
+
+
 def test_robots_in_other_domains_are_not_heard(wired: Wired) -> None:
     inbox = Inbox[Wrench](wired.transport, WRENCH)
     ours, other = (

@@ -7,7 +7,7 @@ import logging
 import struct
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -20,6 +20,7 @@ from examples_running import REPO, Running
 from test_examples_own_drive import command
 
 from bridge.clock import SystemClock
+from bridge.config.bridge import BridgeConfig
 from bridge.config.load import load_config
 from bridge.errors import ConfigError
 from bridge.inbox import Inbox
@@ -31,25 +32,36 @@ from bridge.plugin import load_module
 from bridge.topics import ODOMETRY, SUPPORT_COMMAND, TWIST, WRENCH
 from bridge.transport.memory import MemoryHub
 from bridge.transport.names import type_hash
+from bridge.transport.zenoh import ZenohTransport
 from tests.bridge import bridge_idl as idl
 
 FILE = "examples/ros2_base.py"
 MS = 1_000_000
 
 
+def opened(mode: str, listen: Sequence[str] = ("tcp/127.0.0.1:0",), connect: Sequence[str] = ()) -> Any:
+    settings = zenoh.Config()
+    for path, value in {
+        "mode": mode,
+        "listen/endpoints": listen,
+        "connect/endpoints": connect,
+        "scouting/multicast/enabled": False,
+        "routing/router/peers_failover_brokering": False,
+    }.items():
+        settings.insert_json5(path, json.dumps(value))
+    return zenoh.open(settings)
+
+
 class Base:
     """A base on ROS 2, as it looks behind zenoh-bridge-ros2dds or on rmw_zenoh: it knows nothing of Surefoot."""
 
-    def __init__(self, port: int, naming: str = "ros2dds") -> None:
-        settings = zenoh.Config()
-        for path, value in {
-            "mode": "router",
-            "listen/endpoints": [f"tcp/127.0.0.1:{port}"],
-            "scouting/multicast/enabled": False,
-        }.items():
-            settings.insert_json5(path, json.dumps(value))
-        self.session: Any = zenoh.open(settings)
+    def __init__(self, port: int, naming: str = "ros2dds", namespace: str = "base") -> None:
+        self._namespace = namespace
         self._rmw = naming == "rmw_zenoh"
+        endpoint = f"tcp/127.0.0.1:{port}"
+        self._router = opened(mode="router", listen=[endpoint])
+        # the bridge is a router itself; a node on rmw_zenoh is a peer beside rmw_zenohd, which brokers nothing
+        self.session: Any = opened(mode="peer", connect=[endpoint]) if self._rmw else self._router
         self._publishers = {topic: self.session.declare_publisher(self.key(topic)) for topic in (ODOMETRY, WRENCH)}
         self._number = 0
         self.twist: Any = None
@@ -60,9 +72,9 @@ class Base:
 
     def key(self, topic: Any) -> str:
         if not self._rmw:
-            return f"base/{topic.key}"
+            return f"{self._namespace}/{topic.key}"
         name = topic.ros_type.replace("/msg/", "::msg::dds_::")
-        return f"0/base/{topic.key}/{name}_/{type_hash(topic.ros_type)}"
+        return f"0/{self._namespace}/{topic.key}/{name}_/{type_hash(topic.ros_type)}"
 
     def _receive(self, sample: Any) -> None:
         self.twist = idl.TwistStampedIdl.deserialize(sample.payload.to_bytes())
@@ -92,6 +104,8 @@ class Base:
 
     def close(self) -> None:
         self.session.close()
+        if self._rmw:
+            self._router.close()
 
 
 class Bench:
@@ -199,6 +213,24 @@ def test_wrong_options_are_said(options: dict[str, str], words: str) -> None:
     module = load_module(str(REPO / FILE))
     with pytest.raises(ConfigError, match=words):
         module.read_options({**module.WIRE, **module.OTHER, **options})
+
+
+@pytest.mark.parametrize(("naming", "mode"), [("ros2dds", "peer"), ("rmw_zenoh", "client")])
+def test_topics_may_be_used_as_they_are(naming: str, mode: str) -> None:
+    """A base that says odom and wrench as Surefoot reads them, and takes cmd_vel: no node between, as the page says."""
+    port, own = free_ports(2)
+    wire = {"naming": naming, "mode": mode, "connect": [f"tcp/127.0.0.1:{port}"]}
+    config = BridgeConfig.model_validate(wire | {"endpoints": {"controller": f"tcp/127.0.0.1:{own}"}})
+    clock = SystemClock()
+    with closing(Base(port, naming, "surefoot")) as base, closing(ZenohTransport(config, "controller", clock)) as ours:
+        odometry, wrench, twist = Inbox[Odometry](ours, ODOMETRY), Inbox[Wrench](ours, WRENCH), Outbox(ours, TWIST)
+        end_s = time.monotonic() + 30.0
+        while not (base.heard.is_set() and odometry.read(clock.now_ns()).ok and wrench.read(clock.now_ns()).ok):
+            assert time.monotonic() < end_s
+            base.say(clock.now_ns())
+            twist.send(command(clock.now_ns(), 0.4))
+            time.sleep(0.01)
+        assert base.twist.twist.linear.x == 0.4
 
 
 @pytest.mark.processes
