@@ -62,7 +62,8 @@ class BridgeConfig(Section):
     """First part of every key; give each robot on one network its own."""
 
     naming: Literal["ros2dds", "rmw_zenoh"] = "ros2dds"
-    """Keys as zenoh-bridge-ros2dds maps them, or as ROS 2 nodes with RMW_IMPLEMENTATION=rmw_zenoh_cpp use them."""
+    """Keys as zenoh-bridge-ros2dds maps them, or as ROS 2 nodes with RMW_IMPLEMENTATION=rmw_zenoh_cpp use them
+    (then with mode = "client", or their router hands nothing on)."""
 
     domain: int = Field(default=0, ge=0, le=232)
     """ROS_DOMAIN_ID of those ROS 2 nodes; used with naming = "rmw_zenoh" alone."""
