@@ -20,8 +20,9 @@ def check_weights(patient: Patient) -> Iterator[Finding]:
     """Whether the checkpoint loads, and whether the one that came with Surefoot is still the same."""
     # by its name: the bridge imports no other package
     checkpoint: Any = importlib.import_module("anticipation.checkpoint")
-    named = patient.config.anticipation.checkpoint
-    yield judge_weights(Path(named) if named else Path(checkpoint.SHIPPED), checkpoint.load, shipped=not named)
+    shipped: Any = importlib.import_module("anticipation.shipped")
+    path = Path(shipped.weights(patient.config.anticipation.checkpoint))
+    yield judge_weights(path, checkpoint.load, shipped=path.parent == shipped.FOLDER)
 
 
 def judge_weights(path: Path, load: Any, *, shipped: bool) -> Finding:

@@ -44,7 +44,8 @@ class Cache:
             digest.update(section.model_dump_json().encode())
         digest.update(f"{config.controller.rate_hz}".encode())
         checkpoint = config.anticipation.checkpoint
-        for path in [*([Path(checkpoint)] if checkpoint else []), *_code()]:
+        own = [Path(checkpoint)] if Path(checkpoint).is_file() else []  # weights by name are among the package's files
+        for path in [*own, *_code()]:
             digest.update(str(path).encode() + path.read_bytes())
         self._common = digest.hexdigest()
 
