@@ -55,7 +55,7 @@ def load_clip(spec: str, from_s: float = 0.0, most_s: float = 600.0) -> Clip:
     if not path.is_file():
         raise SourceError(f"clip {spec}: no such file as {path}; expected FILE.npz:NAME")
     try:
-        with np.load(path, allow_pickle=False) as arrays:
+        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as arrays:
             name = _chosen(spec, name, arrays)
             points = np.asarray(arrays[name], dtype=np.float64)
             fps_hz = float(arrays[f"{name}/fps"]) if f"{name}/fps" in arrays else FPS_HZ

@@ -2,9 +2,9 @@
 
 Joint torques track the clip's angles, and feet on the floor push with their share of the weight. Twelve keypoints do
 not balance, so a soft assistance holds the pelvis near the clip's: a spring and a damper, never stronger than ASSIST
-of the weight and ASSIST_MOMENT_NM. RELEASE_S before the end it begins to fade and the nervous system of
-`simulation.person` takes over, from where body and feet are; at the end nothing of it is left, and contacts alone
-decide. Nothing is ever moved but by forces.
+of the weight and ASSIST_MOMENT_NM. RELEASE_S before the end, or at a touchdown shortly before, the nervous system of
+`simulation.person` takes over, from where body and feet are; the assistance only steadies from there on, and fades.
+At the end nothing of it is left, and contacts alone decide. Nothing is ever moved but by forces.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from simulation.person.posture import HIP_SHARE, turn_error
 from simulation.world.world import World
 
 RELEASE_S: Final = 1.2
+PATIENCE_S: Final = 0.7
 BEGIN_S: Final = 1.0  # from standing into the clip's first pose
 START_S: Final = 1.0  # from that pose into its motion
 ASSIST: Final = 0.8  # most force, of the weight
@@ -52,7 +53,7 @@ class Follower:
         self.until_s = min(until_s, track.duration_s + BEGIN_S + 0.5 * START_S)
         self.assistance_n = 0.0
         self._time_s = 0.0
-        self._own = False
+        self._own_s = 0.0  # when the person began to act by themselves; 0 before
         data, person = world.data, world.person
         self._origin: Floats = world.pelvis_m.copy()
         self._standing = [data.qpos[person.legs[side].q].copy() for side in "lr"]
@@ -65,21 +66,26 @@ class Follower:
     def act(self, intent: Intent) -> None:
         """Set torques and assistance of the next turn."""
         self._time_s += CONTROL_S
-        left = min(max((self.until_s - self._time_s) / RELEASE_S, 0.0), 1.0)
         self.assistance_n = 0.0
-        if left == 1.0:
+        if not self._own_s and not self._ready():
             wanted = self._reference(self._time_s)
             force = self._pull(wanted)
             self._track_joints(wanted, force)
             self._assist(wanted, force, 1.0)
             self._before = wanted
             return
-        if not self._own:
-            self._own = True
+        if not self._own_s:
+            self._own_s = self._time_s
             self._person.resume(float(self._before.pitch_rad))
         self._person.act(intent)
-        if left > 0.0:
-            self._let_go(left)
+        if self._time_s < self.until_s:
+            self._let_go((self.until_s - self._time_s) / (self.until_s - self._own_s))
+
+    def _ready(self) -> bool:
+        """Whether to take over: when both feet stand, a step begins; at the latest RELEASE_S before the end."""
+        before_s = self.until_s - self._time_s
+        both = all(leg.on_floor() for leg in self._person.legs.values())
+        return before_s <= RELEASE_S or (both and before_s <= RELEASE_S + PATIENCE_S)
 
     def _reference(self, time_s: float) -> Track:
         """Return where the body should be, in the world: from standing into the clip."""
