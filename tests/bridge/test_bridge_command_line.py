@@ -227,7 +227,6 @@ RUN_HERE: dict[str, tuple[Words, str]] = {
     "keys": (lambda p: ["keys", "show", "--keys", p.keys, "--json", "-"], "json"),
     "codegen": (lambda p: ["codegen", "--out", f"{p.folder}/c"], "nothing"),
     "doctor": (lambda _: ["doctor", "--only", "python", "--json", "-"], "json"),
-    "export": (lambda p: ["export", "--out", f"{p.folder}/deploy", "--json", "-"], "json"),
 }  # fmt: skip
 ELSEWHERE = {  # too long for here: where it is run for real, or with toys
     "up": "bridge/test_bridge_processes_up.py",
@@ -237,6 +236,7 @@ ELSEWHERE = {  # too long for here: where it is run for real, or with toys
     "data": "anticipation/test_anticipation_data_command.py",
     "train": "anticipation/test_anticipation_training_fit.py",
     "evaluate": "anticipation/test_anticipation_training_fit.py",
+    "export": "anticipation/test_anticipation_export.py",
     "personalise": "controller/test_controller_personal_command.py",
 }
 FAKED = ("demo", "campaign", "clips", "tune")  # minutes of simulation: below with the work taken out
