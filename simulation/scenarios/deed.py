@@ -8,6 +8,9 @@ from simulation.person.person import Intent
 from simulation.world.world import World
 
 
+SETTLES_M = 0.06  # lower in wish once on the seat: the trunk's straightening does not lift the weight off it
+
+
 def gradual(since_s: float, lasts_s: float) -> float:
     """Return 0 before, 1 after, and a smooth rise between: least jerk."""
     u = min(max(since_s / lasts_s, 0.0), 1.0)
@@ -35,9 +38,10 @@ class SitDown:
         down = gradual(since_s, self.lasts_s)
         bend = gradual(since_s, 0.9 * self.lasts_s) - 0.8 * gradual(since_s - self.lasts_s, 1.0)
         back = gradual(since_s, self.lasts_s)
+        settled = SETTLES_M * gradual(since_s - self.lasts_s, 1.0)
         return replace(
             intent,
-            crouch_m=self.down_m * down,
+            crouch_m=self.down_m * down + settled,
             trunk_pitch_rad=self.bend_rad * bend,
             back_m=self.back_m * back,
             reach_rad=bend,

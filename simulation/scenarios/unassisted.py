@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from simulation.person.person import CONTROL_S
+from simulation.person.person import CONTROL_S, GRAVITY
 from simulation.scenarios.scenario import Performance, Scenario
 
+SEATED = 0.3  # share of the weight that a chair carries when somebody sits on its edge, feet on the floor
 DESCENT_M_S = 0.15  # downward speed of the pelvis that is a descent
 REST = (0.0, 0.0, 0.0, 0.0)
 
@@ -21,7 +22,7 @@ class Course(NamedTuple):
 
 
 def unassisted(scenario: Scenario) -> Course:
-    """Perform `scenario` without harness; what falls before anything happens is a fall as well."""
+    """Perform `scenario` without harness; what falls before anything happens is a fall, and so is missing a chair."""
     performance = Performance(scenario, worn=False)
     world = performance.world
     nothing = float("nan")
@@ -38,4 +39,5 @@ def unassisted(scenario: Scenario) -> Course:
                 return Course(True, nothing, nothing, speed)
             return Course(True, descent - began, world.time_s - began, speed)
         speed = -vertical
-    return Course(world.person.fallen, nothing, nothing, nothing)
+    missed = scenario.seat is not None and world.seat_force_n() < SEATED * GRAVITY * scenario.size.mass_kg
+    return Course(world.person.fallen or missed, nothing, nothing, nothing)

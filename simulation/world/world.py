@@ -113,6 +113,7 @@ class World:
         self._parts = [self.model.body(name).id if name else -1 for name in BODY_PARTS]
         self._forearms = [self.model.body(f"{side}_forearm").id for side in "lr"]
         self._impacts = frozenset(self.model.geom(name).id for name in IMPACTS)
+        self._seat = -1 if seat is None else self.model.geom("seat").id
         self._velocity = np.zeros(6)
         self.time_s = 0.0
         self.disturbing: list[tuple[int, Floats]] = []  # (body, (6,) force and torque), for the next turn only
@@ -190,6 +191,17 @@ class World:
             if other in self._impacts:
                 return str(self.model.geom(other).name)
         return ""
+
+    def seat_force_n(self) -> float:
+        """Return the weight that the chair carries [N]; 0 without one."""
+        if self._seat < 0:
+            return 0.0
+        total = 0.0
+        for contact in self.data.contact:
+            if self._seat in (contact.geom1, contact.geom2) and contact.efc_address >= 0:
+                rows = 2 * (contact.dim - 1)  # edges of the friction pyramid, each with the whole normal share
+                total += float(self.data.efc_force[contact.efc_address : contact.efc_address + rows].sum())
+        return total
 
     def _couple(self) -> None:
         """Apply the harness to pelvis and carriage."""

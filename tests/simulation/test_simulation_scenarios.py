@@ -92,6 +92,28 @@ def test_a_family_that_never_is_what_it_claims_is_an_error(monkeypatch: pytest.M
         draw_checked("fall", 0, 5)
 
 
+def sitting(seed: int) -> Scenario:
+    rng = np.random.default_rng(seed)
+    return library.sitting(rng, *library.draw_person(rng))
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_who_sits_down_ends_on_the_chair_and_without_one_on_the_floor(seed: int) -> None:
+    scenario = sitting(seed)
+    performance = Performance(scenario, worn=False)
+    world = performance.world
+    assert world.seat_force_n() == 0.0
+    while world.time_s < scenario.duration_s:
+        performance.advance(REST)
+    assert world.seat_force_n() > 0.3 * 9.81 * scenario.size.mass_kg
+    assert not world.person.fallen
+    assert world.touched_down() == ""
+    assert not unassisted(scenario).fell
+    seat = scenario.seat
+    assert seat is not None
+    assert unassisted(replace(scenario, seat=seat._replace(x_m=-2.0))).fell, "missing the chair is no sitting down"
+
+
 def test_a_push_waits_for_its_moment_of_the_stride() -> None:
     began = []
     for stride in (0.2, 0.7):
