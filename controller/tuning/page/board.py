@@ -150,7 +150,8 @@ class Board:
         try:
             done = self._bench.save(self._draft)
         except SurefootError as error:
-            ui.notify(f"Nothing written: {error}", type="negative", multi_line=True, close_button="OK")
+            close = [{"label": "OK", "color": "white"}]
+            ui.notify(f"Nothing written: {error}", type="negative", multi_line=True, actions=close)
             return
         self._draft = Draft.of(self._bench.config)
         self._file_scores = None
