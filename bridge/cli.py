@@ -93,9 +93,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         _say(str(error))
         code = error.exit_code
     except USAGE_ERROR as error:
-        command = error.ctx.command_path if error.ctx is not None else "surefoot"
-        _say(f"{error.format_message()} (see {command} --help)")
-        code = ExitCode.BAD_INPUT
+        command, said = error.ctx.command_path if error.ctx is not None else "surefoot", error.format_message()
+        code = ExitCode.BAD_INPUT if said else ExitCode.DONE  # a group without a command has shown its help
+        if said:
+            _say(f"{said} (see {command} --help)")
     except (KeyboardInterrupt, typer.Abort):
         code = ExitCode.INTERRUPTED
     except Exception as error:  # noqa: BLE001 (the last to know: a fault has an exit code of its own)

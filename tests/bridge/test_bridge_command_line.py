@@ -148,6 +148,14 @@ def test_exit_codes_stand_in_help_and_docs(capsys: pytest.CaptureFixture[str], m
         assert f"| {code.value} | {meaning} |" in docs
 
 
+@pytest.mark.parametrize("words", [[], ["keys"]])
+def test_without_a_command_there_is_help(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(words) == 0
+    said = capsys.readouterr()
+    assert "Usage: surefoot" in said.out
+    assert said.err == ""
+
+
 def writers(tree: ast.AST) -> Iterator[str]:
     """Give what in a file writes to the terminal by itself."""
     for node in ast.walk(tree):
