@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from simulation.person.person import Intent
 from simulation.world.world import World
 
-
 SETTLES_M = 0.06  # lower in wish once on the seat: the trunk's straightening does not lift the weight off it
 
 
