@@ -30,37 +30,55 @@ class Command(NamedTuple):
 
     target: str  # module:function
     purpose: str  # one line
+    panel: str = "Commands"  # of the list of commands
 
+
+RUN: Final = "Run"
+LOOK: Final = "Record and look"
+TUNE: Final = "Set up and tune"
+MAKE: Final = "Simulate, train, export"
 
 COMMANDS: Final = {
-    "up": Command("bridge.launch.command:up", "Run the processes and watch over them."),
-    "codegen": Command("controller.mpc.export.command:codegen", "Write the MPC as C for a real-time target."),
-    "personalise": Command(
-        "controller.personal.command:personalise", "Find the mass and damping that one person likes, by comparisons."
+    "up": Command("bridge.launch.command:up", "Run the processes and watch over them.", RUN),
+    "rehearse": Command("bridge.launch.rehearse:rehearse", "Run it all on a recorded stumble, without physics.", RUN),
+    "demo": Command("simulation.trial.command:demo", "A simulated person is pushed, with help and without.", RUN),
+    "router": Command("bridge.launch.router:router", "Join the processes of several machines.", RUN),
+    "record": Command("bridge.record.record_command:record", "Record what is on the wire into an MCAP file.", LOOK),
+    "info": Command("bridge.record.info_command:info", "Say what is in a recording, also one that was cut off.", LOOK),
+    "replay": Command("bridge.record.replay_command:replay", "Replay a recording to everyone or to one process.", LOOK),
+    "view": Command("bridge.view.command:view", "Look at what runs, or at a recording, in Rerun.", LOOK),
+    "assess": Command(
+        "bridge.assess.command:assess", "Assess keypoint clips offline with the code that runs live.", LOOK
     ),
-    "doctor": Command("bridge.doctor.command:doctor", "Say what is wrong on this machine and how to mend it."),
-    "config": Command("bridge.config.command:config", "Print a configuration file with every key and its meaning."),
-    "demo": Command("simulation.trial.command:demo", "A simulated person is pushed, with help and without."),
-    "rehearse": Command("bridge.launch.rehearse:rehearse", "Run it all on a recorded stumble, without physics."),
-    "assess": Command("bridge.assess.command:assess", "Assess keypoint clips offline with the code that runs live."),
-    "tune": Command("controller.tuning.command:tune", "Find thresholds by replaying recordings; see the trade-off."),
-    "latency": Command("bridge.latency.command:latency", "Measure newest frame to command on the wire, hop by hop."),
-    "record": Command("bridge.record.record_command:record", "Record what is on the wire into an MCAP file."),
-    "info": Command("bridge.record.info_command:info", "Say what is in a recording, also one that was cut off."),
-    "replay": Command("bridge.record.replay_command:replay", "Replay a recording to everyone or to one process."),
-    "view": Command("bridge.view.command:view", "Look at what runs, or at a recording, in Rerun."),
-    "keys": Command("bridge.keys.command:keys", "Make and look at the certificates of the roles."),
-    "router": Command("bridge.launch.router:router", "Join the processes of several machines."),
-    "data": Command("anticipation.training.data_command:data", "List and check the data there is to train on."),
-    "train": Command("anticipation.training.commands:train", "Train the anticipation networks."),
-    "export": Command("anticipation.export_command:export", "Write the networks as an ONNX graph."),
-    "evaluate": Command(
-        "anticipation.training.evaluation.command:evaluate", "Measure the anticipation, split by sequence."
+    "latency": Command(
+        "bridge.latency.command:latency", "Measure newest frame to command on the wire, hop by hop.", LOOK
+    ),
+    "doctor": Command("bridge.doctor.command:doctor", "Say what is wrong on this machine and how to mend it.", TUNE),
+    "config": Command(
+        "bridge.config.command:config", "Print a configuration file with every key and its meaning.", TUNE
+    ),
+    "keys": Command("bridge.keys.command:keys", "Make and look at the certificates of the roles.", TUNE),
+    "tune": Command(
+        "controller.tuning.command:tune", "Find thresholds by replaying recordings; see the trade-off.", TUNE
+    ),
+    "personalise": Command(
+        "controller.personal.command:personalise",
+        "Find the mass and damping that one person likes, by comparisons.",
+        TUNE,
     ),
     "campaign": Command(
-        "simulation.campaign.command:campaign", "Hundreds of simulated falls: no help, reactive, anticipatory."
+        "simulation.campaign.command:campaign", "Hundreds of simulated falls: no help, reactive, anticipatory.", MAKE
     ),
-    "clips": Command("simulation.campaign.clips.command:clips", "Record simulated falls and daily deeds to train on."),
+    "clips": Command(
+        "simulation.campaign.clips.command:clips", "Record simulated falls and daily deeds to train on.", MAKE
+    ),
+    "data": Command("anticipation.training.data_command:data", "List and check the data there is to train on.", MAKE),
+    "train": Command("anticipation.training.commands:train", "Train the anticipation networks.", MAKE),
+    "evaluate": Command(
+        "anticipation.training.evaluation.command:evaluate", "Measure the anticipation, split by sequence.", MAKE
+    ),
+    "export": Command("anticipation.export_command:export", "Write the networks as an ONNX graph.", MAKE),
+    "codegen": Command("controller.mpc.export.command:codegen", "Write the MPC as C for a real-time target.", MAKE),
 }
 
 _usage_error = typer.BadParameter.__base__  # typer names only this one of its usage errors
@@ -125,9 +143,9 @@ def _app(words: Sequence[str]) -> typer.Typer:
     for name, command in COMMANDS.items():
         loaded = _load(command.target) if name == wanted else _not_loaded
         if isinstance(loaded, typer.Typer):  # a command with commands of its own
-            app.add_typer(loaded, name=name, short_help=command.purpose)
+            app.add_typer(loaded, name=name, short_help=command.purpose, rich_help_panel=command.panel)
         else:
-            app.command(name, short_help=command.purpose)(loaded)
+            app.command(name, short_help=command.purpose, rich_help_panel=command.panel)(loaded)
     return app
 
 
