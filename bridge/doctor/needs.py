@@ -69,5 +69,4 @@ def _installed() -> Needs:
         for name in about.get_all("Provides-Extra") or []
     }
     always = tuple(one for one in every if one.marker is None or one.marker.evaluate({"extra": ""}))
-    named = {name: tuple(one for one in needed if one not in always) for name, needed in named.items()}
     return Needs(str(about["Requires-Python"] or ""), always, named, "the installed package")

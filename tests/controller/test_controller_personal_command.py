@@ -215,6 +215,9 @@ class TestRefusals:
             (lambda text: text.replace('"seed"', '"seeed"'), "see"),
             (lambda text: text.replace("35.0", "9000.0", 3), "9000"),
             (lambda text: text.replace('"asked"', '"felt"'), "asked"),
+            (lambda text: json.dumps({**json.loads(text), "asked": [0, 0]}), "comparison 1 is between 0 and 0"),
+            (lambda text: json.dumps({**json.loads(text), "asked": None}), "settings: there are 2, expected 1"),
+            (lambda text: json.dumps({**json.loads(text), "settings": []}), "settings: there are 0, expected 2"),
         ],
     )
     def test_a_damaged_state_is_named_and_left(
