@@ -43,8 +43,8 @@ WAYS: dict[str, Way] = {
     r"surefoot (up|router) --config (camera|walker)\.toml.*": Way(
         "two machines; tests/bridge/test_bridge_several_machines.py runs both files", never=True
     ),
-    r"surefoot up --config keys/bridge\.toml": Way(
-        "real processes over TLS", "--no-screen --duration 15 --source clip.npz:walk {tls}", long=True, says=AT_WORK
+    r"surefoot up --config keys/bridge\.toml.*": Way(
+        "real processes over TLS", "--no-screen --duration 15 {tls}", long=True, says=AT_WORK
     ),
     r"surefoot router .*": Way(
         "runs until it is stopped", "--set 'bridge.router.listen=[\"tls/127.0.0.1:{port}\"]'", long=True, stops_s=8
