@@ -14,7 +14,7 @@ from bridge.assess.clips import Clip, read_clips
 from bridge.assess.run import Assessment, assess_clip
 from bridge.clock import NS
 from bridge.command_line.options import ConfigOption, JsonOption, SetOption
-from bridge.command_line.output import STDOUT, progress, require_writable, result, write_json
+from bridge.command_line.output import STDOUT, progress, require_writable, result, status, write_json
 from bridge.config.load import load_config
 from bridge.errors import SurefootError
 
@@ -55,7 +55,8 @@ def assess(
     if plot is not None:
         from bridge.assess.plot import write_plots  # noqa: PLC0415 (matplotlib is loaded only where it draws)
 
-        write_plots(results, {clip.name: np.array(clip.stamps_ns) / NS for clip in clips}, parsed, plot)
+        with status("drawing"):
+            write_plots(results, {clip.name: np.array(clip.stamps_ns) / NS for clip in clips}, parsed, plot)
     told = [_told(clip, results[clip.name]) for clip in clips]
     if json is not None:
         write_json(json, {"results": out, "clips": told})

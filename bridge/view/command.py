@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
+from rich.progress import BarColumn, TimeRemainingColumn
 
 from bridge.clock import SystemClock
 from bridge.command_line.options import ConfigOption, CropOption, DurationOption, ForceOption, SetOption
-from bridge.command_line.output import note
+from bridge.command_line.output import note, progress
 from bridge.config.load import load_config
 from bridge.config.perception import SourceConfig
 from bridge.config.surefoot import SurefootConfig
@@ -103,7 +104,7 @@ def view(
             _live(studio, loaded, ended)
             studio.finish()
         else:
-            studio.show_recording(found, ended)
+            _draw(studio, found, ended)
             studio.finish()
             if found.damage:
                 note(f"{found.path}: not whole: {found.damage}")
@@ -114,6 +115,17 @@ def view(
     if out is not None:
         note(f"{out}: {out.stat().st_size / 1e6:.2f} MB")
     return 0
+
+
+def _draw(studio: Studio, recording: Recording, ended: Callable[[], bool]) -> None:
+    with progress("drawing", BarColumn(), TimeRemainingColumn()) as bar:
+        task = bar.add_task("drawing", total=1.0)
+
+        def looked() -> bool:
+            bar.update(task, completed=recording.progress)
+            return ended()
+
+        studio.show_recording(recording, looked)
 
 
 def _live(studio: Studio, config: SurefootConfig, ended: Callable[[], bool]) -> None:

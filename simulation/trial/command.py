@@ -16,7 +16,7 @@ from rich.table import Table
 
 from bridge.clock import NS
 from bridge.command_line.options import ConfigOption, JsonOption, SetOption
-from bridge.command_line.output import STDOUT, note, note_console, require_writable, result, write_json
+from bridge.command_line.output import STDOUT, note, note_console, require_writable, result, status, write_json
 from bridge.config.load import load_config
 from bridge.errors import SurefootError
 from bridge.launch.observed import observe
@@ -28,6 +28,7 @@ from simulation.scenarios.single import AFTER_EVENT_S
 from simulation.trial.figure import Told, draw
 from simulation.trial.outcome import Outcome, outcome_of
 from simulation.trial.trace import Trace, load_trace
+from simulation.weights import for_simulated_people
 
 WORLD: Final = (
     f"launch.roles={list(ROLES)}",
@@ -75,7 +76,9 @@ def demo(
     console = note_console()
     chosen = [f"simulation.clip={clip}"] if clip else []
     overrides = [*(set_ or []), *chosen, *private_wire(config, set_ or [], ROLES, "demo"), *WORLD]
-    settings = load_config(config, overrides).simulation
+    asked = for_simulated_people(load_config(config, overrides))
+    overrides.append(f'anticipation.checkpoint="{asked.anticipation.checkpoint}"')
+    settings = asked.simulation
     console.print(
         f"[bold]surefoot demo[/]  {settings.person_height_m:.2f} m, {settings.person_mass_kg:.0f} kg, walking at"
         f" {settings.walking_speed_m_s:.1f} m/s; {settings.scenario} at {settings.event_s:.0f} s;"
@@ -92,7 +95,9 @@ def demo(
     ]
     draw(told, out / "timeline.png")
     made = ["timeline.png", *(name for name in ("held.mcap", "unheld.mcap") if (out / name).is_file())]
-    if film and _film(out, config, overrides, settings.event_s, console):
+    with status("rendering the film"):
+        filmed = film and _film(out, config, overrides, settings.event_s, console)
+    if filmed:
         made = ["demo.gif", "demo.png", *made]
     if json is not None:
         write_json(json, {"held": _plain(held), "unheld": _plain(unheld), "folder": out, "files": made})
