@@ -15,6 +15,7 @@ from bridge.config.load import load_config
 from simulation.campaign.arms import ARMS
 from simulation.campaign.campaign import Plan, run_campaign
 from simulation.campaign.report import PAGE, SUMMARY, number
+from simulation.weights import for_simulated_people
 
 SHOWN = (
     "falls", "falls_arrested", "non_falls", "needless_arrests", "needless_guards", "tip_overs", "pelvis_drop_p95_m",
@@ -46,11 +47,13 @@ def campaign(
     Everything is simulated time: the same seed gives the same results on any machine, with any number of jobs. Stop it
     and start it again: what is done is kept. Results: summary.json, results.parquet and index.html in the folder.
 
+    The networks are those that have seen simulated people; `--set anticipation.checkpoint=default` takes the others.
+
     Example: surefoot campaign --scenarios 12 --jobs 2 --seed 1 --out runs/campaign
     """
     plan = Plan(
-        scenarios, scenarios if non_falls is None else non_falls, seed, load_config(config, set_ or []),
-        tuple(arm.strip() for arm in arms.split(",")), record,
+        scenarios, scenarios if non_falls is None else non_falls, seed,
+        for_simulated_people(load_config(config, set_ or [])), tuple(arm.strip() for arm in arms.split(",")), record,
     )  # fmt: skip
     if json is not None:
         require_writable(json)
