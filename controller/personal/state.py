@@ -167,6 +167,9 @@ def require_same(study: Study, space: Space, name: str) -> None:
     Raises:
         StudyError: names the first parameter that differs.
     """
+    keys, known = [side.key for side in study.parameters], [side.key for side in space.parameters]
+    if keys != known:
+        raise StudyError(f"{name}: asks about {', '.join(keys)}, expected {', '.join(known)}: --force begins anew")
     for side, now in zip(study.parameters, space.parameters, strict=True):
         if Parameter(side.key, side.low, side.high, side.present) != now:
             raise StudyError(

@@ -66,6 +66,26 @@ class TestAsking:
         in_use = {"mass_horizontal_kg": 35.0, "damping_free_forward_ns_m": 30.0}
         assert in_use in [question["admittance"] for question in said["question"].values()]
 
+    @pytest.mark.parametrize(
+        "text",
+        [
+            "",
+            "admittance = { mass_horizontal_kg = 35.0 }\n",
+            "admittance.mass_horizontal_kg = 35.0\n[walker]\nwheel_mass_kg = 2.5\n",
+            "[walker]\nwheel_mass_kg = 2.5",
+        ],
+    )
+    def test_however_the_configuration_is_written(self, config: Path, text: str) -> None:
+        config.write_text(text)
+        before = load_config(config)
+        run("next", "--comparisons", 2, "--force")
+        answer_all("ab")
+        after = load_config(Path("anna/personal.toml"))
+        fragment = {"mass_horizontal_kg", "damping_free_forward_ns_m"}
+        assert after.model_copy(update={"admittance": before.admittance}) == before
+        for key, value in after.admittance.model_dump().items():
+            assert key in fragment or value == getattr(before.admittance, key)
+
     def test_next_again_is_the_same_question(self, config: Path, capsys: pytest.CaptureFixture[str]) -> None:
         run("next")
         first = capsys.readouterr().out
@@ -215,6 +235,7 @@ class TestRefusals:
             (lambda text: text.replace('"seed"', '"seeed"'), "see"),
             (lambda text: text.replace("35.0", "9000.0", 3), "9000"),
             (lambda text: text.replace('"asked"', '"felt"'), "asked"),
+            (lambda text: text.replace("mass_horizontal_kg", "inertia_yaw_kg_m2"), "asks about inertia_yaw_kg_m2"),
             (lambda text: json.dumps({**json.loads(text), "asked": [0, 0]}), "comparison 1 is between 0 and 0"),
             (lambda text: json.dumps({**json.loads(text), "asked": None}), "settings: there are 2, expected 1"),
             (lambda text: json.dumps({**json.loads(text), "settings": []}), "settings: there are 0, expected 2"),
