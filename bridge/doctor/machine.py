@@ -14,7 +14,7 @@ from typing import Final
 from bridge.doctor.finding import Finding, Level, Patient
 
 CORES: Final = "cores"
-REALTIME: Final = "real time"
+REALTIME: Final = "realtime"
 DISK: Final = "disk"
 ENOUGH_CORES: Final = 4  # one for each process of the usual system
 FEW_MB, NO_MB = 1000, 50  # an hour of a recording with pictures; what logs alone need

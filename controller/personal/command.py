@@ -39,7 +39,7 @@ def personalise(
         ),
     ] = Action.ASK,
     choice: Annotated[
-        str | None, typer.Argument(metavar="[CHOICE]", help="With answer: a, b or same.", show_default=False)
+        str | None, typer.Argument(metavar="CHOICE", help="With answer: a, b or same.", show_default=False)
     ] = None,
     out: Annotated[
         Path, typer.Option("--out", metavar="FOLDER", help="Folder of the study: one for each person.")
