@@ -37,27 +37,35 @@ class Judge:
 
     def judge(self, sample: Any) -> Judged | None:
         """Return what an inbox says of the next `bridge.transport.interface.Sample`; None if it says nothing."""
-        other = self._source is not None and sample.source != self._source
-        if other and sample.arrival_ns - self._heard_ns <= self._topic.max_age_s * NS:
+        lapsed = sample.arrival_ns - self._heard_ns > self._topic.max_age_s * NS
+        if self._source is not None and sample.source != self._source and not lapsed:
             return None
         try:
             message = decode(self._topic, sample.payload, max(sample.sequence, 0))
         except InvalidMessage:
             return None
-        numbered = sample.source == self._source and sample.sequence >= 0
-        if not (sample.sequence > self._sequence if numbered else message.stamp_ns > self._stamp_ns):
+        ahead_s = (message.stamp_ns - sample.arrival_ns) / NS
+        if ahead_s > FUTURE_S:
+            words = f"{self._topic.key} is stamped {ahead_s * 1e3:.0f} ms ahead, limit {FUTURE_S * 1e3:.0f}"
+            return Judged(message, sample.arrival_ns, words)
+        if self._is_old(sample, message.stamp_ns, lapsed=lapsed):
             return None
         fault = ""
-        ahead_s = (message.stamp_ns - sample.arrival_ns) / NS
         try:
-            if ahead_s > FUTURE_S:
-                raise InvalidMessage(
-                    f"{self._topic.key} is stamped {ahead_s * 1e3:.0f} ms ahead, limit {FUTURE_S * 1e3:.0f}"
-                )
             message.check()
             self._stuck.judge(message)
         except InvalidMessage as error:
             fault = str(error)
-        self._source, self._sequence = sample.source, sample.sequence
-        self._stamp_ns, self._heard_ns = message.stamp_ns, sample.arrival_ns
+        if not fault or sample.source == self._source or not getattr(message, "valid", True):
+            self._source, self._sequence = sample.source, sample.sequence
+            self._stamp_ns, self._heard_ns = message.stamp_ns, sample.arrival_ns
         return Judged(message, sample.arrival_ns, fault)
+
+    def _is_old(self, sample: Any, stamp_ns: int, *, lapsed: bool) -> bool:
+        """Whether something newer was taken already: by number within a publisher, by stamp after its silence."""
+        if sample.source == self._source and sample.sequence >= 0:
+            if sample.sequence > self._sequence:
+                return False
+            if not lapsed:
+                return True
+        return stamp_ns <= self._stamp_ns

@@ -26,12 +26,15 @@ def course(seed: int, seconds: float = 6.0) -> Case:
     rng = np.random.default_rng(seed)
     count = int(seconds * 30)
     stamps = START_NS + (np.arange(count) * NS / 30).astype(np.int64) + rng.integers(-(10**6), 10**6, count)
-    late = rng.integers(10**6, 6 * 10**7, count) - (40_000_000 if rng.random() < 0.3 else 0)
+    clock_ahead = seed % 4 == 1
+    late = rng.integers(10**6, 6 * 10**7, count) - (40_000_000 if clock_ahead else 0)
+    if seed % 3 == 1:  # a link that is slow for a while
+        late[count // 3 : count // 3 + 20] += 300_000_000
     arrivals = np.maximum.accumulate(stamps + late)
-    ahead = np.cumsum(np.repeat(wandering(rng, count, 2.0)[:, None], STEPS, axis=1) / 30, axis=1)
-    distance = 3.0 + wandering(rng, count, 2.0)[:, None] + ahead
-    near = -distance.mean(axis=1)
-    odds = np.stack([np.full(count, 2.0), 0.5 * near + 1, 2.0 * near + 6 + wandering(rng, count, 0.5)], axis=1)[:, None]
+    ahead = np.cumsum(np.repeat(wandering(rng, count, 20.0)[:, None], STEPS, axis=1) / 30, axis=1)
+    distance = 4.5 + wandering(rng, count, 1.5)[:, None] + 0.8 * ahead
+    near = -distance
+    odds = np.stack([np.full_like(near, 2.0), 0.5 * near + 2, 1.5 * near + 3], axis=2)
     odds = np.exp(odds + 0.1 * rng.normal(size=(count, STEPS, 3)))
     faults = [""] * count
     for begin in rng.integers(0, count, rng.integers(0, 4)).tolist():
@@ -45,7 +48,7 @@ def course(seed: int, seconds: float = 6.0) -> Case:
         np.clip(0.75 + wandering(rng, count, 0.25), 0.0, 1.0),
         np.full(count, 1 / 30),
     )
-    if seed % 3 == 0:  # nothing comes for a while
+    if seed % 3 == 0 or clock_ahead:  # nothing comes for a while
         arrivals[count // 2 : count // 2 + 12] = arrivals[count // 2 + 12]
         horizons = replace(
             horizons, stream=stream("fall_horizon", arrivals.tolist(), stamps.tolist(), horizons.stream.faults)
@@ -59,8 +62,8 @@ def course(seed: int, seconds: float = 6.0) -> Case:
         PERIOD_NS,
         turns,
         horizons,
-        _felt(rng, "wrench", np.clip(wandering(rng, turns, 250.0, 100) + 60.0, -100.0, 900.0)) if felt else None,
-        _felt(rng, "odom", wandering(rng, turns, 0.2, 100)) if felt else None,
+        _felt(rng, "wrench", np.clip(wandering(rng, turns, 190.0, 100) + 40.0, -100.0, 900.0)) if felt else None,
+        _felt(rng, "odom", wandering(rng, turns, 0.22, 100)) if felt else None,
         (Fall(0.4 * seconds, 0.5 * seconds, 0.7 * seconds),),
     )
 
