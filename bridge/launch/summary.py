@@ -34,6 +34,7 @@ class Summary(NamedTuple):
     guard_s: float | None
     arrest_s: float | None
     before: tuple[Episode, ...]  # what was over before the fall began
+    stopped_s: float | None = None  # the run ended then, before the fall was over
 
 
 def fall_of(label: NDArray[np.int8], time_s: Floats) -> tuple[float | None, float | None]:
@@ -54,11 +55,13 @@ def summarise(rows: Sequence[Row], onset_s: float | None, lying_s: float | None)
     if onset_s is None:
         return Summary(None, None, None, None, None, None, tuple(episodes))
     before = tuple(episode for episode in episodes if episode.end_s < onset_s)
+    end_s = rows[-1].time_s
+    stopped_s = end_s if end_s < (onset_s if lying_s is None else lying_s) else None
     during = [episode for episode in episodes if episode.end_s >= onset_s]
     met = next((episode for episode in during if lying_s is None or episode.end_s >= lying_s), None)
     met = met or (during[-1] if during else None)
     if met is None:
-        return Summary(onset_s, lying_s, None, None, None, None, before)
+        return Summary(onset_s, lying_s, None, None, None, None, before, stopped_s)
     since = [row for row in rows if row.time_s >= met.start_s]
     return Summary(
         onset_s,
@@ -68,6 +71,7 @@ def summarise(rows: Sequence[Row], onset_s: float | None, lying_s: float | None)
         next((row.time_s for row in since if row.state == GaitState.GUARD), None),
         next((row.time_s for row in since if row.state == GaitState.ARREST), None),
         before,
+        stopped_s,
     )
 
 
@@ -113,6 +117,8 @@ def _about_the_fall(summary: Summary) -> list[str]:
     if summary.onset_s is None:
         return ["The recording holds no fall."]
     onset_s = summary.onset_s
+    if summary.stopped_s is not None and summary.stiffening_s is None:
+        return [f"Stopped at {summary.stopped_s:.2f} s; balance is lost at {onset_s:.2f} s, so nothing is known of it."]
     lines = [f"Balance is lost at {onset_s:.2f} s" + _at("the body lies", summary.lying_s, onset_s) + "."]
     if summary.stiffening_s is None:
         return [*lines, "The walker did not stiffen: the fall was missed."]

@@ -47,6 +47,13 @@ def test_a_missed_fall_is_called_missed():
     assert "missed" in " ".join(sentences(summary, np.array([])))
 
 
+def test_a_fall_that_was_not_waited_for_is_not_called_missed():
+    summary = summarise(rows_of(*[(0.0, "FOLLOW")] * 20), 5.0, 6.0)
+    text = " ".join(sentences(summary, np.array([])))
+    assert "Stopped at" in text
+    assert "missed" not in text
+
+
 def test_stiffening_for_nothing_is_said():
     walk = [(0.0, "FOLLOW")] * 5 + [(0.4, "GUARD")] * 3 + [(0.0, "FOLLOW")] * 5 + [(1.0, "ARREST")] * 5
     summary = summarise(rows_of(*walk), 1.2, 1.6)
