@@ -5,7 +5,10 @@
 Falls: S. Choi et al., 'Kinematic analysis of video-captured falls experienced by older adults in long-term care',
 J. Biomechanics 48(6), 2015: loss of balance to pelvis impact 1271 +- 648 ms, descent to impact 583 +- 255 ms, pelvis
 speed at impact 2.14 +- 0.63 m/s. Survived pushes: `push_recovery/human-data.csv`, where the research data is. Gait:
-D. Grieve and R. Gear, Ergonomics 9(5), 1966: step length grows with speed^0.42.
+D. Grieve and R. Gear, Ergonomics 9(5), 1966: step length grows with speed^0.42. Vertical force of a foot: T. Keller et
+al., 'Relationship between vertical ground reaction force and speed during walking, slow jogging, and running', Clinical
+Biomechanics 11(5), 1996: 1.2 body weights in walking at 1.5 m/s; in the two humps and the hollow of D. Winter,
+'Biomechanics and Motor Control of Human Movement'. Forces are means over 20 ms.
 """
 
 from __future__ import annotations
@@ -31,9 +34,13 @@ from simulation.scenarios.scenario import Performance, Scenario, Wish
 from simulation.world.world import World
 
 EVENT_S = 6.0
+SMOOTH = round(0.020 / CONTROL_S)
 LONGEST_S = 6.0  # after the event
 CHOI = {"balance_to_impact_ms": (1271, 648), "descent_to_impact_ms": (583, 255), "impact_speed_m_s": (2.14, 0.63)}
 SPEEDS = (0.3, 0.5, 0.7, 0.9, 1.1)
+CHANGES = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7)  # of velocity by a sideways push [m/s]
+PUSHED_SPEED_M_S = 0.9  # as the 29 people walked, in the median
+HUMPS = ((0.0, 0.35), (0.35, 0.65), (0.65, 1.0))  # of a stance: first hump, hollow, second hump
 REST = (0.0, 0.0, 0.0, 0.0)
 
 
@@ -101,10 +108,27 @@ def gait(speed: float, seconds: float = 24.0) -> dict[str, Any]:
         force.append(vertical_force(world, "l") / (size.mass_kg * 9.81))
     way = float(np.linalg.norm(world.pelvis_m[:2] - start[:2]))
     count = world.person.steps - steps
+    real = way / (seconds - 8.0)
+    length = published_step(real, size.height_m)
+    stance = stance_shape(np.convolve(force, np.ones(SMOOTH) / SMOOTH, "valid"))
     return {
-        "wanted_m_s": speed, "speed_m_s": way / (seconds - 8.0), "cadence_steps_min": count / (seconds - 8.0) * 60.0,
-        "step_length_m": way / max(count, 1), "stance": stance_shape(np.array(force)),
+        "wanted_m_s": speed, "speed_m_s": real, "cadence_steps_min": count / (seconds - 8.0) * 60.0,
+        "step_length_m": way / max(count, 1), "published_step_length_m": length,
+        "published_cadence_steps_min": 60.0 * real / length, "stance": stance, "humps_weights": humps(stance),
     }  # fmt: skip
+
+
+def published_step(speed: float, height: float) -> float:
+    """Return the step length at a speed after Grieve and Gear [m]."""
+    return 0.62 * height / 1.70 * (speed / 1.2) ** 0.42
+
+
+def humps(stance: list[float]) -> list[float]:
+    """Return the highest, the lowest and again the highest force of a mean stance [body weight]."""
+    if not stance:
+        return []
+    parts = [stance[round(100 * begin) : round(100 * end) + 1] for begin, end in HUMPS]
+    return [max(parts[0]), min(parts[1]), max(parts[2])]
 
 
 def vertical_force(world: World, side: str) -> float:
@@ -157,10 +181,13 @@ def measure(count: int, seed: int) -> dict[str, Any]:
     rng = np.random.default_rng(seed)
     falls = [fall for fall, _ in (perform(*each) for each in draw_people(rng, count)) if fall is not None]
     survived = []
-    for change in np.linspace(0.1, 0.7, 13):
-        size = BodySize(1.75, 72)
-        fall, detour = perform(Push(EVENT_S + float(rng.uniform(0, 0.6)), change * size.mass_kg, 90.0), size, 0.8)
-        survived.append({"velocity_change_m_s": float(change), "detour_m": detour, "fell": fall is not None})
+    size = BodySize(1.75, 72)
+    for change in CHANGES:
+        for direction in (90.0, -90.0):
+            for later in (0.0, 0.28, 0.55):
+                push = Push(EVENT_S + later, change * size.mass_kg, direction)
+                fall, detour = perform(push, size, PUSHED_SPEED_M_S)
+                survived.append({"velocity_change_m_s": change, "detour_m": detour, "fell": fall is not None})
     kinds = sorted({fall.kind for fall in falls})
     return {
         "drawn": count,
@@ -173,8 +200,25 @@ def measure(count: int, seed: int) -> dict[str, Any]:
         "published": {name: {"mean": mean, "sd": sd} for name, (mean, sd) in CHOI.items()},
         "each": [fall._asdict() for fall in falls],
         "pushes": survived,
+        "pushes_by_change": by_change(survived),
         "gait": [gait(speed) for speed in SPEEDS],
     }
+
+
+def by_change(pushes: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return, for each change of velocity, how many were survived and how far they led astray, beside real people."""
+    recorded = recorded_detours()
+    rows = []
+    for change in CHANGES:
+        own = [p for p in pushes if p["velocity_change_m_s"] == change]
+        stood = [p["detour_m"] for p in own if not p["fell"]]
+        real = [detour for c, detour in recorded if abs(c - change) <= 0.05]
+        rows.append({
+            "velocity_change_m_s": change, "survived": len(stood), "of": len(own),
+            "detour_m": summary(stood) if stood else None, "recorded": len(real),
+            "recorded_detour_m": summary(real) if real else None,
+        })  # fmt: skip
+    return rows
 
 
 def draw(result: dict[str, Any], out: Path) -> None:
@@ -239,8 +283,20 @@ def main() -> None:
         own = result["falls"][name]
         print(f"{name:24} {own['mean']:8.2f} +- {own['sd']:.2f}   published {published[0]} +- {published[1]}")
     for each in result["gait"]:
-        cadence, length = each["cadence_steps_min"], each["step_length_m"]
-        print(f"wanted {each['wanted_m_s']:.1f}: {each['speed_m_s']:.2f} m/s, {cadence:.0f} steps/min, {length:.2f} m")
+        first, hollow, second = each["humps_weights"] or [float("nan")] * 3
+        print(
+            f"wanted {each['wanted_m_s']:.1f}: {each['speed_m_s']:.2f} m/s, {each['cadence_steps_min']:.0f} steps/min"
+            f" of {each['step_length_m']:.2f} m (published {each['published_cadence_steps_min']:.0f} of"
+            f" {each['published_step_length_m']:.2f} m), foot {first:.2f} / {hollow:.2f} / {second:.2f} weights"
+        )
+    for row in result["pushes_by_change"]:
+        own, real = row["detour_m"], row["recorded_detour_m"]
+        told = f"{own['mean']:.2f} +- {own['sd']:.2f} m" if own else "-"
+        recorded = f"{real['mean']:.2f} +- {real['sd']:.2f} m of {row['recorded']}" if real else "no data"
+        print(
+            f"sideways by {row['velocity_change_m_s']:.1f} m/s: {row['survived']} of {row['of']} survived,"
+            f" detour {told}; people: {recorded}"
+        )
     if given.json:
         given.json.parent.mkdir(parents=True, exist_ok=True)
         given.json.write_text(json.dumps(result, indent=1))

@@ -11,6 +11,8 @@ from types import ModuleType
 import numpy as np
 from documented import REPO
 
+from simulation.kinematic.motion import Walker, move
+
 CLIP = "walk-stumble-fall"
 SHIPPED = REPO / "simulation" / "demo" / f"{CLIP}.npz"
 FRAMES = 75  # two and a half seconds
@@ -40,6 +42,9 @@ def furnish(folder: Path) -> None:
         file = folder / f"{name}.npz"
         file.parent.mkdir(parents=True, exist_ok=True)
         np.savez(file, **{f"{part}/{key}": value for key, value in short.items()})
+    motion = move(Walker(speed_m_s=0.5), (), 4.0, np.random.default_rng(0))
+    every = round(1.0 / 30.0 / float(motion.time_s[1]))
+    np.savez(folder / "walks.npz", slow=motion.keypoints_m[::every])
     (folder / "recordings" / "labels.csv").write_text(LABELS, encoding="utf-8")
     shutil.copytree(folder / "recordings", folder / "FOLDER")
     for name in ("C.toml", "my.toml", "robot.toml"):
