@@ -51,6 +51,11 @@ def choose(outcomes: Sequence[Outcome], budget_per_hour: float, change: Sequence
     return Chosen(min(every, key=lambda i: (outcomes[i].needless, *_merit(outcomes[i]), change[i], i)), False)
 
 
+def as_good(one: Outcome, other: Outcome) -> bool:
+    """Return whether `one` is no worse than `other` in falls, lead (in whole frames) and needless interventions."""
+    return one.needless <= other.needless and all(a <= b for a, b in zip(_merit(one), _merit(other), strict=True))
+
+
 def pareto(outcomes: Sequence[Outcome], change: Sequence[float]) -> list[int]:
     """Return which outcomes no other one beats in falls caught, median lead and needless interventions at once.
 

@@ -19,7 +19,7 @@ from controller.tuning.folds import folds
 from controller.tuning.reference import replay_live
 from controller.tuning.replay import replay
 from controller.tuning.score import Intervening, Outcome, Tally, total
-from controller.tuning.search import Tried, search_grid, search_study
+from controller.tuning.search import Tried, search_grid, search_study, simplify
 from controller.tuning.space import Setting, Space
 
 CHECKED_S: Final = 120.0  # recording that the chosen setting is replayed on with the code that runs live
@@ -104,11 +104,11 @@ def recommend(
         outcomes = tried.outcomes(every)
         if not outcomes[0].falls and not outcomes[0].hours:
             raise SurefootError("nothing to tune on: in these recordings nobody falls and nothing is watched")
-        change = [question.space.change(setting, present) for setting in tried.settings]
-        chosen = choose(outcomes, question.budget_per_hour, change)
+        chosen = choose(outcomes, question.budget_per_hour, _change(question, tried, present))
         held = _hold_out(cases, question, present, evaluator, tried, told)
+        best = simplify(tried, chosen.number, present, evaluator, every)
     held_out = _together(held) if held else None
-    recommended = _judged(tried, chosen.number)
+    recommended, outcomes, change = _judged(tried, best), tried.outcomes(every), _change(question, tried, present)
     _check(cases, config, recommended.config, stages)
     judged = recommended.outcome if held_out is None else held_out
     return Answer(
@@ -163,14 +163,20 @@ def _hold_out(
         if question.method != "grid":  # every setting of a grid is tried anyway
             what = f"holding out part {fold + 1} of {count}"
             known = _search(question, present, evaluator, inside, partial(told, what))
-        outcomes = known.outcomes(inside)
-        change = [question.space.change(setting, present) for setting in known.settings]
-        chosen = choose(outcomes, question.budget_per_hour, change)
-        row = known.tallies[chosen.number]
+        known = Tried(
+            list(known.settings), list(known.configs), list(known.tallies)
+        )  # what is added here is of this fold alone
+        chosen = choose(known.outcomes(inside), question.budget_per_hour, _change(question, known, present))
+        best = simplify(known, chosen.number, present, evaluator, inside)
+        row = known.tallies[best]
         held.append(
-            Fold(known.settings[chosen.number], chosen.within, outcomes[chosen.number], total(row[i] for i in outside))
+            Fold(known.settings[best], chosen.within, total(row[i] for i in inside), total(row[i] for i in outside))
         )  # fmt: skip
     return held
+
+
+def _change(question: Question, tried: Tried, present: InterventionConfig) -> list[float]:
+    return [question.space.change(setting, present) for setting in tried.settings]
 
 
 def _together(held: Sequence[Fold]) -> Outcome:

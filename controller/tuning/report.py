@@ -22,7 +22,7 @@ def table(answer: Answer) -> Table:
     """Return the trade-off."""
     made = Table(title=f"{answer.tried} settings on {len(answer.cases)} recordings", title_justify="left")
     made.add_column("")
-    made.add_column("setting", overflow="fold")
+    made.add_column("setting", overflow="fold", max_width=72)
     for name in ("caught", "lead [s]", "needless", "per hour"):
         made.add_column(name, justify="right")
     for mark, judged in rows(answer):

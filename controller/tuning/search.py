@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 
 from bridge.config.intervention import InterventionConfig
 from bridge.errors import MissingExtraError
+from controller.tuning.choose import as_good
 from controller.tuning.evaluate import Evaluator
 from controller.tuning.score import Outcome, Tally, total
 from controller.tuning.space import Setting, Space, changed, configured, ordered, rounded
@@ -96,6 +97,34 @@ def search_study(
                 tried.tallies.append(row)
         told(len(batch) / trials)
     return tried
+
+
+def simplify(
+    tried: Tried, number: int, present: InterventionConfig, evaluator: Evaluator, chosen_on: Sequence[int]
+) -> int:
+    """Return the number of a setting as good as that of `number` with little changed; add it to `tried`.
+
+    One changed value after the other goes back to the present one, where that makes nothing worse on the cases chosen
+    on: what was changed and does not matter there may matter elsewhere.
+    """
+    setting, goal = dict(tried.settings[number]), total(tried.tallies[number][i] for i in chosen_on)
+    for key in tuple(setting):
+        less = {name: value for name, value in setting.items() if name != key}
+        config = configured(present, less)
+        if config is None:
+            continue
+        (row,) = evaluator.tallies([config])
+        if not as_good(total(row[i] for i in chosen_on), goal):
+            continue
+        setting = less
+        if less in tried.settings:
+            number = tried.settings.index(less)
+            continue
+        tried.settings.append(less)
+        tried.configs.append(config)
+        tried.tallies.append(row)
+        number = len(tried.settings) - 1
+    return number
 
 
 def _propose(

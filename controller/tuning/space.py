@@ -19,7 +19,7 @@ from bridge.errors import ConfigError
 Setting = dict[str, float | int]  # values of `[intervention]` that differ from the file's
 
 MOST_GRID: Final = 20_000
-DIGITS: Final = 4  # a threshold is not known better
+DIGITS: Final = 3  # a threshold is not known better
 
 
 class Range(NamedTuple):

@@ -65,6 +65,22 @@ def test_the_counts_are_those_of_the_replay(answer: Answer) -> None:
         assert tally == score_one(replay(case, answer.recommended.config, CONFIG.supervisor))
 
 
+def test_what_does_not_matter_is_not_changed() -> None:
+    """Nothing comes near the fall boundary here: thresholds of the distance stay as they are."""
+    words = [
+        "probability_full=0.3:0.98",
+        "probability_onset=0.05:0.9",
+        "distance_onset_sd=1:3",
+        "approach_far_sd=2.5:5",
+    ]
+    question = asked("study", folds=2)._replace(space=parse_space(words, "study"))
+    answer = recommend(days(falls=3, calm=3), CONFIG, question)
+    assert (answer.recommended.outcome.caught, answer.recommended.outcome.needless) == (3, 0)
+    assert set(answer.recommended.setting) <= {"probability_full", "probability_onset"}
+    for fold in answer.folds:
+        assert set(fold.setting) <= {"probability_full", "probability_onset"}
+
+
 def test_every_recording_is_held_out_once(answer: Answer) -> None:
     held = answer.held_out
     assert held is not None
