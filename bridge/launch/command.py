@@ -68,9 +68,9 @@ def up(
         "controller": _given(controller=controller, log=log),
     }
     _require_started(options, loaded.launch.roles)
+    display = _display(json, no_screen=no_screen)
     require_free(loaded.bridge.endpoints, loaded.launch.roles)
     log_dir = Path(loaded.launch.log_dir)
-    display = _display(json, no_screen=no_screen)
     with Launcher(loaded, config, overrides, options, log_dir) as launcher:
         given_up = watch_over(launcher, loaded, display, Limits(duration, keep_running))
     for process in given_up:
