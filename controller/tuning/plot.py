@@ -29,11 +29,13 @@ def draw(answer: Answer) -> Figure:
         axes.grid(color="#eeeeee", linewidth=0.8, zorder=0)
         axes.tick_params(labelsize=9, colors=INK)
         axes.set_xlabel("needless interventions per hour", fontsize=10)
+    _panel(caught, answer, lambda one: 100.0 * one.caught_share)
+    _panel(lead, answer, lambda one: one.lead_median_s)
     share, spread = wilson(answer.judged.caught, answer.judged.falls), answer.resampled.lead_median_s
-    _panel(caught, answer, lambda one: 100.0 * one.caught_share, (100.0 * share.low, 100.0 * share.high))
-    _panel(lead, answer, lambda one: one.lead_median_s, (spread.low, spread.high))
+    _interval(caught, answer.judged.per_hour, 100.0 * share.low, 100.0 * share.high)
+    _interval(lead, answer.recommended.outcome.per_hour, spread.low, spread.high)
     caught.set_ylabel("falls caught [%]", fontsize=10)
-    caught.set_ylim(-4.0, 104.0)
+    caught.set_ylim(-4.0, 107.0)
     lead.set_ylabel("median lead before the impact [s]", fontsize=10)
     lead.set_ylim(bottom=0.0)
     rates = [one.per_hour for one in answer.every if isfinite(one.per_hour)]
@@ -64,7 +66,7 @@ def png(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def _panel(axes: Any, answer: Answer, value: Callable[[Outcome], float], spread: tuple[float, float]) -> None:
+def _panel(axes: Any, answer: Answer, value: Callable[[Outcome], float]) -> None:
     def points(outcomes: Sequence[Outcome]) -> tuple[list[float], list[float]]:
         known = [(one.per_hour, value(one)) for one in outcomes]
         known = [point for point in known if isfinite(point[0]) and isfinite(point[1])]
@@ -84,10 +86,15 @@ def _panel(axes: Any, answer: Answer, value: Callable[[Outcome], float], spread:
     if answer.held_out is None:
         return
     x, y = points([answer.held_out])
-    if x and isfinite(spread[0]):  # 95 % intervals
-        axes.plot(x * 2, spread, color=FALL, linewidth=1.0, alpha=0.6, zorder=1.5)
+    if x:  # 95 % interval
         axes.plot((answer.needless.low, answer.needless.high), y * 2, color=FALL, linewidth=1.0, alpha=0.6, zorder=1.5)
     axes.plot(
-        x, y, "*", markerfacecolor="white", markeredgecolor=FALL, markersize=12, markeredgewidth=1.3,
+        x, y, "*", markerfacecolor="none", markeredgecolor=FALL, markersize=21, markeredgewidth=1.3,
         label="chosen without, judged on (95 %)", zorder=5,
     )  # fmt: skip
+
+
+def _interval(axes: Any, x: float, low: float, high: float) -> None:
+    """Draw a 95 % interval along y."""
+    if isfinite(x) and isfinite(low):
+        axes.plot((x, x), (low, high), color=FALL, linewidth=1.0, alpha=0.6, zorder=1.5)
