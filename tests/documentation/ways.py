@@ -26,7 +26,7 @@ class Way(NamedTuple):
 
 SHORT = "--no-screen --duration 15 {wire}"
 AT_WORK = "DISARMED|FOLLOW|GUARD|ARREST|SAFE_STOP"  # commands came
-QUICK = "--quick --folds 2"
+QUICK = "--quick --folds 2 --no-baselines"
 
 WAYS: dict[str, Way] = {
     # the whole system
