@@ -16,6 +16,7 @@ PAGES = [
     *sorted((REPO / "examples").rglob("*.md")),
 ]
 PROGRAMS = ("surefoot", "make", "python", "python3", "pip", "torchrun", "tensorboard", "dask", "rerun", "mcap", "ros2")
+SHELLS = ("sh", "bash", "shell", "console")
 _FENCE = re.compile(r"^ *```(?P<language>\w*)\n(?P<text>.*?)^ *```", re.DOTALL | re.MULTILINE)
 _INLINE = re.compile(r"(?<!`)`([^`]+)`(?!`)")
 
@@ -61,7 +62,7 @@ def commands(page: str) -> list[tuple[str, bool]]:
     """Return the commands of one page's text in their order: lines of `sh` blocks (True), code in sentences (False)."""
     places: list[tuple[int, str, bool]] = []
     for fence in _FENCE.finditer(page):
-        if fence["language"] in ("sh", "bash", "shell", "console"):
+        if fence["language"] in SHELLS:
             places += [(fence.start(), line, True) for line in _lines(fence["text"])]
     prose = _FENCE.sub(lambda fence: " " * len(fence[0]), page)  # places stay
     for code in _INLINE.finditer(prose):
@@ -75,6 +76,14 @@ def _lines(block: str) -> list[str]:
     joined = re.sub(r"\\\n\s*", " ", block)
     lines = (re.sub(r"(^|\s)#.*", "", line).strip().removeprefix("$ ") for line in joined.splitlines())
     return [part.strip() for line in lines if line for part in line.split("&&")]
+
+
+def stray(page: str) -> list[str]:
+    """Return lines that look like commands and stand in a block that is not `sh`, where nobody would execute them."""
+    other = [fence["text"] for fence in _FENCE.finditer(page) if fence["language"] not in SHELLS]
+    indented = re.findall(r"^ {4,}\S.*$", _FENCE.sub("", page), re.MULTILINE)
+    lines = (line.strip().removeprefix("$ ") for block in [*other, *indented] for line in block.splitlines())
+    return [line for line in lines if line.split(" ")[0] in PROGRAMS]
 
 
 def plain(text: str) -> str:

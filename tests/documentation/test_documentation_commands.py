@@ -15,7 +15,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from documented import Documented, documented
+from documented import PAGES as FILES
+from documented import Documented, documented, stray
 from execution import NotAsDocumentedError, execute, parse, places, recipe
 from stand_ins import furnish
 from ways import WAYS, way
@@ -40,6 +41,11 @@ def judged() -> list[Documented]:
 def test_there_is_something_to_execute() -> None:
     assert len(COMMANDS) > 60
     assert {"README.md", "docs/start.md", "docs/recording.md"} <= set(PAGES)
+
+
+def test_commands_stand_where_they_are_found() -> None:
+    assert {str(page): found for page in FILES if (found := stray(page.read_text(encoding="utf-8")))} == {}
+    assert stray("```\nsurefoot up\n```\n\n    make test\n\n```sh\nsurefoot up\n```\n") == ["surefoot up", "make test"]
 
 
 def test_options_values_and_files_of_every_command_exist(furnished: Path, monkeypatch: pytest.MonkeyPatch) -> None:
