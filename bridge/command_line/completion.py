@@ -20,11 +20,17 @@ _BREAKS: Final = "=:"  # those of Bash's COMP_WORDBREAKS that occur in our words
 
 
 def asked_words() -> list[str] | None:
-    """Return the words the shell wants to have completed, without the program's name; None: it does not ask."""
-    instruction = os.environ.get(VARIABLE)
-    if not instruction:
+    """Return the words before the one the shell wants to have completed, without the program; None: it does not ask.
+
+    A command is loaded only when its name is whole.
+    """
+    if not os.environ.get(VARIABLE):
         return None
-    return _split(os.environ.get("COMP_WORDS", os.environ.get("_TYPER_COMPLETE_ARGS", "")))[1:]
+    if "COMP_WORDS" in os.environ:
+        return _split(os.environ["COMP_WORDS"])[1 : int(os.environ.get("COMP_CWORD", "1"))]
+    text = os.environ.get("_TYPER_COMPLETE_ARGS", "")
+    words = _split(text)[1:]
+    return words if text.endswith(" ") else words[:-1]
 
 
 def answer(complete: Callable[[], object]) -> str:

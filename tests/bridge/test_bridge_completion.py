@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bridge import cli
 from bridge.cli import COMMANDS, main
 from bridge.command_line.completion import join_broken, settings
 from bridge.config.load import load_config
@@ -74,6 +75,24 @@ def test_offers(
 
 def test_every_command_is_offered(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     assert set(offered("surefoot ", monkeypatch, capsys)) == set(COMMANDS)
+
+
+def test_a_command_whose_name_is_being_written_is_not_loaded(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(cli, "_load", lambda target: pytest.fail(f"loaded {target}"))
+    assert offered("surefoot evaluate", monkeypatch, capsys) == ["evaluate"]
+
+
+@pytest.mark.parametrize(("line", "expected"), [("surefoot lat", "latency"), ("surefoot info --js", "--json")])
+def test_zsh_asks_in_another_way(
+    line: str, expected: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("_SUREFOOT_COMPLETE", "complete_zsh")
+    monkeypatch.setenv("_TYPER_COMPLETE_ARGS", line)
+    monkeypatch.setattr(sys, "argv", ["surefoot"])
+    assert main() == 0
+    assert expected in capsys.readouterr().out
 
 
 def test_clips_of_a_keypoint_file(
