@@ -44,7 +44,9 @@ class SimulationNode:
         """Set the scene of `[simulation]`, or take over a `performance` that was made elsewhere."""
         config, trace = _with_options(context)
         self._trace = TraceWriter(Path(trace)) if trace else None
-        self._performance = Performance(scenario_from(config)) if performance is None else performance
+        if performance is None:
+            performance = Performance(scenario_from(config), slack_m=config.harness_slack_m)
+        self._performance = performance
         self._performance.waiting = config.begins == "armed"
         self.world = self._performance.world
         self._period_s = 1.0 / config.rate_hz

@@ -42,6 +42,9 @@ class SimulationConfig(Section):
     push_direction_deg: float = Field(default=0.0, ge=-360, le=360)
     """Direction of the push in the walker's axes: 0 from behind, 90 to the left, 180 from the front [degrees]."""
 
+    harness_slack_m: float = Field(default=0.02, ge=0, le=0.20)
+    """How far the pelvis may come down before the straps bear [m]."""
+
     seed: int = Field(default=0, ge=0)
     """Of everything that is drawn: noise of camera and force sensor."""
 

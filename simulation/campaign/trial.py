@@ -28,7 +28,7 @@ def run_trial(scenario: Scenario, arm: str, config: SurefootConfig, keep: Path |
 
     What was on the wire is recorded into `keep` (`.mcap`), if that is given, with a list of falls beside it.
     """
-    performance = Performance(scenario)
+    performance = Performance(scenario, slack_m=config.simulation.harness_slack_m)
     recorder = Recorder(START_NS)
     performance.watchers.append(recorder.note)
     made: list[SimulationNode] = []

@@ -13,6 +13,7 @@ from simulation.person.ability import FRAIL, Ability
 from simulation.person.anthropometry import BodySize
 from simulation.person.person import Intent
 from simulation.scenarios.disturbance import AtPhase, Disturbance
+from simulation.world.parameters import HarnessParameters
 from simulation.world.world import Seat, World
 
 Kind = Literal["fall", "non_fall"]
@@ -40,6 +41,7 @@ class SensorFaults:
 
 
 HEALTHY: Final = SensorFaults()
+SLACK_M: Final = HarnessParameters().slack_down_m
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,10 +67,11 @@ class Scenario:
 class Performance:
     """A scenario under way: the world and what the scenario does to it."""
 
-    def __init__(self, scenario: Scenario, *, worn: bool = True) -> None:
-        """Set the scene; without the harness (`worn` False) nobody helps."""
+    def __init__(self, scenario: Scenario, *, worn: bool = True, slack_m: float = SLACK_M) -> None:
+        """Set the scene; without the harness (`worn` False) nobody helps, with it straps bear beyond `slack_m`."""
         self.scenario = scenario
-        self.world = World(scenario.size, scenario.ability, seat=scenario.seat, worn=worn)
+        harness = HarnessParameters(slack_down_m=slack_m)
+        self.world = World(scenario.size, scenario.ability, harness=harness, seat=scenario.seat, worn=worn)
         self._track = None if scenario.clip is None else retarget(scenario.clip, scenario.size)
         self.follower: Follower | None = None  # who drives the person along the clip
         self.waiting = False  # while True the person stands and nothing begins

@@ -117,7 +117,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--config", type=Path)
     given = parser.parse_args(arguments)
     config = load_config(given.config, given.set).simulation
-    model = Performance(scenario_from(config)).world.model
+    model = Performance(scenario_from(config), slack_m=config.harness_slack_m).world.model
     try:
         stage = Stage(model)
     except Exception as error:  # noqa: BLE001 (every OpenGL binding fails in its own way)
