@@ -65,7 +65,7 @@ class AdmittanceConfig(Section):
     take_up_force_n: float = Field(default=120.0, ge=0, le=1000)
     """Pull up to which a fully stiffened column rises to take up the harness's slack [N]; 0 leaves the slack."""
 
-    take_up_speed_m_s: float = Field(default=0.2, gt=0, le=1)
+    take_up_speed_m_s: float = Field(default=0.35, gt=0, le=1)
     """Speed at which it rises, fully stiffened and without load [m/s]."""
 
     take_up_reach_m: float = Field(default=0.06, ge=0, le=0.3)

@@ -45,7 +45,7 @@ class InterventionConfig(Section):
     unconfirmed_most: float = Field(default=0.7, ge=0, le=1)
     """Largest risk by distance and approach, unless `probability_full` confirms it; and by a doubtful horizon."""
 
-    probability_onset: float = Field(default=0.5, ge=0, le=1)
+    probability_onset: float = Field(default=0.2, ge=0, le=1)
     """Probability of fall above which risk begins."""
 
     probability_full: float = Field(default=0.9, ge=0, le=1)

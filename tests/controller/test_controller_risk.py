@@ -137,7 +137,7 @@ class TestConfig:
             ("intervention.distance_full_sd=2.0", "distance_full_sd = 2 must be below distance_onset_sd = 1.5"),
             ("intervention.approach_full_s=0.8", "approach_full_s = 0.8 must be below approach_onset_s = 0.8"),
             ("intervention.approach_near_sd=4", "approach_near_sd = 4 must be below approach_far_sd = 3.5"),
-            ("intervention.probability_full=0.2", "probability_onset = 0.5 must be below probability_full = 0.2"),
+            ("intervention.probability_full=0.1", "probability_onset = 0.2 must be below probability_full = 0.1"),
             ("intervention.release_per_s=9", "release_per_s = 9 must be below rise_per_s = 8"),
             ("supervisor.guard_off=0.25", "guard_off = 0.25 must be below guard_on = 0.25"),
             ("supervisor.arrest_off=0.9", "arrest_off = 0.9 must be below arrest_on = 0.8"),
