@@ -82,13 +82,13 @@ def _fall(
 
 def _calm(
     family: str, title: str, size: BodySize, ability: Ability, wishes: tuple[Wish, ...], rng: np.random.Generator,
-    deeds: tuple[Disturbance, ...] = (), seat: Seat | None = None,
+    deeds: tuple[Disturbance, ...] = (), seat: Seat | None = None, *, lowered_m: float = 0.0,
 ) -> Scenario:  # fmt: skip
     last = max([wish.at_s for wish in wishes] + [deed.at_s for deed in deeds])
     return Scenario(
         title=title, kind="non_fall", family=family, size=size, wishes=wishes, ability=ability, disturbances=deeds,
         duration_s=round(max(last + AFTER_DEED_S, 8.0), 1), seat=seat, seed=int(rng.integers(2**31)),
-        faults=draw_faults(rng, last), checks=CALM_CHECKS,
+        faults=draw_faults(rng, last), checks=CALM_CHECKS, lowered_m=lowered_m,
     )  # fmt: skip
 
 
@@ -185,7 +185,7 @@ def sitting(rng: np.random.Generator, size: BodySize, ability: Ability) -> Scena
     seat = chair(size, down)
     deed = SitDown(float(rng.uniform(2.5, 3.5)), down + 0.05, lasts)
     title = f"sits down by {down * 100:.0f} cm in {lasts:.1f} s"
-    return _calm("sitting", title, size, ability, (Wish(0.0, Intent()),), rng, (deed,), seat)
+    return _calm("sitting", title, size, ability, (Wish(0.0, Intent()),), rng, (deed,), seat, lowered_m=down)
 
 
 def picking_up(rng: np.random.Generator, size: BodySize, ability: Ability) -> Scenario:

@@ -108,6 +108,8 @@ def test_who_sits_down_ends_on_the_chair_and_without_one_on_the_floor(seed: int)
     assert world.seat_force_n() > 0.3 * 9.81 * scenario.size.mass_kg
     assert not world.person.fallen
     assert world.touched_down() == ""
+    sunk = world.person.pelvis_height_m - world.pelvis_m[2]
+    assert sunk == pytest.approx(scenario.lowered_m, abs=0.03), "as low as they meant to come"
     assert not unassisted(scenario).fell
     seat = scenario.seat
     assert seat is not None
