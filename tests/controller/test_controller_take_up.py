@@ -46,9 +46,8 @@ def test_the_straps_bear_and_no_more(s: float) -> None:
     person = standing()
     before = float(person.loop.pose[3])
     heights = person.stand(1.5, s)
-    assert (
-        0.1 * s * CONFIG.take_up_force_n < person.load_n() <= 1.2 * s * CONFIG.take_up_force_n + 10.0
-    )  # half a millimetre of strap
+    wanted_n, millimetre_n = s * CONFIG.take_up_force_n, 1e-3 * STRAP_N_M
+    assert 0.1 * wanted_n < person.load_n() <= wanted_n + millimetre_n
     assert heights[-1] - before == pytest.approx(SLACK_M, abs=0.004)
 
 
