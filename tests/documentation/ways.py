@@ -76,7 +76,7 @@ WAYS: dict[str, Way] = {
     r"torchrun .*--nnodes.*": Way("needs two machines", never=True),
     r"torchrun .*": Way("two processes; learns", "--quick --force", long=True, data=True),
     r"surefoot train.*": Way("learns", "--quick --force --no-tensorboard", long=True, data=True),
-    r"surefoot evaluate --from .*": Way("of a report", long=True, data=True),
+    r"surefoot evaluate --from .*": Way("of a report that a quick run made", "--quick", long=True, data=True),
     r"surefoot evaluate.*": Way("learns", f"{QUICK} --no-live", long=True, data=True),
     r"surefoot data.*": Way("counts the research data", long=True, data=True),
     # what performs
