@@ -84,7 +84,7 @@ class SourceConfig(Section):
 class MovenetConfig(Section):
     """`[perception.movenet]`: MoveNet SinglePose through LiteRT."""
 
-    weights: str = "../shared/data/weights/movenet_lightning_int8.tflite"
+    weights: str = ""
     """Path of the `.tflite` file, relative to the working directory; "" = not set."""
     crop_min_score: float = Field(default=0.2, ge=0, le=1)
     """Keypoints with less score than this do not place the crop of the next frame."""
