@@ -32,7 +32,7 @@ def load_movenet(config: MovenetConfig) -> Movenet:
         MissingExtraError: LiteRT or OpenCV is not installed.
     """
     if not config.weights:
-        raise SourceError("perception.movenet.weights is not set: path of the MoveNet SinglePose Lightning .tflite file (int8)")
+        raise SourceError("perception.movenet.weights is not set: path of MoveNet's .tflite file")
     litert = load_extra("ai_edge_litert.interpreter", "MoveNet", "ai-edge-litert", "movenet")
     cv2 = load_opencv("MoveNet", "movenet")
     if not Path(config.weights).is_file():

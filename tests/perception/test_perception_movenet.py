@@ -121,7 +121,7 @@ def test_missing_weights_and_wrong_files_are_said(tmp_path: Path) -> None:
 def test_the_missing_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "ai_edge_litert.interpreter", None)
     with pytest.raises(MissingExtraError, match=r"MoveNet needs .* pip install 'surefoot\[movenet\]'"):
-        load_movenet(MovenetConfig())
+        load_movenet(MovenetConfig(weights="movenet.tflite"))
 
 
 @pytest.mark.data
