@@ -92,6 +92,7 @@ WAYS: dict[str, Way] = {
     r"python -m benchmarks\.personal.*": Way("asks simulated people", "--people 1", long=True),
     r"python -m benchmarks\.walks.*": Way("measures", "--seconds 2", long=True),
     r"python -m benchmarks\.falls.*": Way("measures", "--falls 2", long=True),
+    r"python -m benchmarks\.foresight.*": Way("performs falls", "--falls 1", long=True),
     r"python -m benchmarks\.faults.*": Way("measures real processes", "--list", long=True),
     r"python -m benchmarks\.fuzz.*": Way("a million payloads", "--count 50 --json runs/fuzz.json", long=True),
     r"python -m benchmarks\.soak.*": Way(
