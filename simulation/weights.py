@@ -1,7 +1,8 @@
 """Which networks judge simulated people where the configuration names none.
 
 The shipped ones learnt from films of people who fall freely; what is a fall to them is lying. Those named 'simulated'
-have also seen simulated people caught by a harness (their card: anticipation/weights/SIMULATED.md).
+have also seen simulated people caught by a harness (their card: anticipation/weights/SIMULATED.md). Campaigns use
+these; the demo runs as shipped.
 """
 
 from __future__ import annotations

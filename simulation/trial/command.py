@@ -28,7 +28,6 @@ from simulation.scenarios.single import AFTER_EVENT_S
 from simulation.trial.figure import Told, draw
 from simulation.trial.outcome import Outcome, outcome_of
 from simulation.trial.trace import Trace, load_trace
-from simulation.weights import for_simulated_people
 
 WORLD: Final = (
     f"launch.roles={list(ROLES)}",
@@ -50,6 +49,7 @@ class Trial(NamedTuple):
     event_s: float  # when it happened, in the rows' time [s]
     outcome: Outcome
     reason: str  # of the first ARREST
+    arrest_s: float  # from what happened to it; negative: needlessly before; NaN: none
 
 
 def demo(
@@ -76,9 +76,7 @@ def demo(
     console = note_console()
     chosen = [f"simulation.clip={clip}"] if clip else []
     overrides = [*(set_ or []), *chosen, *private_wire(config, set_ or [], ROLES, "demo"), *WORLD]
-    asked = for_simulated_people(load_config(config, overrides))
-    overrides.append(f'anticipation.checkpoint="{asked.anticipation.checkpoint}"')
-    settings = asked.simulation
+    settings = load_config(config, overrides).simulation
     console.print(
         f"[bold]surefoot demo[/]  {settings.person_height_m:.2f} m, {settings.person_mass_kg:.0f} kg, walking at"
         f" {settings.walking_speed_m_s:.1f} m/s; {settings.scenario} at {settings.event_s:.0f} s;"
@@ -108,7 +106,15 @@ def demo(
 
 
 def _plain(trial: Trial) -> dict[str, Any]:
-    return {**trial.outcome._asdict(), "held": trial.outcome.held, "reason": trial.reason}
+    return {
+        **trial.outcome._asdict(), "held": trial.outcome.held, "reason": trial.reason, "arrest_s": trial.arrest_s,
+    }  # fmt: skip
+
+
+def _when(arrest_s: float) -> str:
+    if np.isnan(arrest_s):
+        return "-"
+    return f"{arrest_s:+.2f}" + (": needlessly before" if arrest_s < 0 else "")
 
 
 def _run(
@@ -132,8 +138,9 @@ def _run(
         raise SurefootError(f"demo: the trial ended before {event_s:g} s; see {out / 'logs' / name}")
     happened_ns = float(np.interp(event_s, told.time_s, told.stamp_ns))
     happened_s = (happened_ns - (recorder.origin_ns or 0)) / NS
-    arrest = next((row.reason for row in rows if row.state == "ARREST"), "")
-    return Trial(told, rows, happened_s, outcome_of(told, event_s), arrest)
+    arrest = next((row for row in rows if row.state == "ARREST"), None)
+    reason, arrest_s = ("", float("nan")) if arrest is None else (arrest.reason, arrest.time_s - happened_s)
+    return Trial(told, rows, happened_s, outcome_of(told, event_s), reason, arrest_s)
 
 
 @contextmanager
@@ -186,5 +193,6 @@ def _side_by_side(held: Trial, unheld: Trial) -> Table:
     )
     for name, of in lines:
         table.add_row(name, of(held.outcome), of(unheld.outcome))
+    table.add_row("arrested, s after it happened", *(_when(trial.arrest_s) for trial in (held, unheld)))
     table.add_row("why it arrested", held.reason or "-", unheld.reason or "-")
     return table

@@ -289,7 +289,7 @@ def test_demo_with_its_trials_taken_out(
 
     def trial(name: str, *_: Any) -> command.Trial:
         outcome = Outcome(0.05 if name == "held" else 0.7, 900.0, name != "held", tipped=False)
-        return command.Trial(None, [], 5.0, outcome, "harness load")  # type: ignore[arg-type]
+        return command.Trial(None, [], 5.0, outcome, "harness load", 0.5)  # type: ignore[arg-type]
 
     monkeypatch.setattr(command, "_run", trial)
     monkeypatch.setattr(command, "draw", lambda *_: None)
