@@ -148,8 +148,13 @@ def _parse_python(words: list[str]) -> None:
     if importlib.util.find_spec(words[1]) is None:
         raise ValueError(f"no module {words[1]}")
     if words[1].startswith("benchmarks."):
-        with _only_parsing(words[1:]):
-            runpy.run_module(words[1], run_name="__main__")
+        known = sys.modules.pop(words[1], None)  # another test's import: runpy would warn of it
+        try:
+            with _only_parsing(words[1:]):
+                runpy.run_module(words[1], run_name="__main__")
+        finally:
+            if known is not None:
+                sys.modules[words[1]] = known
 
 
 @contextmanager
