@@ -52,7 +52,7 @@ def judge_compiler(compiled: Any) -> Finding:
     path: Path | None = compiled.library(_PROBE, "-O0")
     if path is None:
         text = f"{compiler} does not build into {folder}: {slower}"
-        return Finding(COMPILER, Level.WARNING, text, f"echo 'int f;' | {compiler} -shared -fPIC -x c - -o /tmp/f.so")
+        return Finding(COMPILER, Level.WARNING, text, f"echo 'int f;' | {compiler} -shared -fPIC -x c - -o f.so")
     try:
         works = ctypes.CDLL(str(path)).surefoot_probe() == 42
     except OSError as error:
